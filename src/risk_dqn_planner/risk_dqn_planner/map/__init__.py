@@ -1,1 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
+"""Lanelet2 maps: loading, and following a route on them."""

@@ -17,9 +17,7 @@ def overlap(pose1: Pose, pose2: Pose, length: float = 4.0, width: float = 2.0) -
 
 
 @pytest.mark.parametrize(("gap", "expected"), [(2.99, True), (3.01, False)])
-def test_perpendicular_cars_touch_at_half_length_plus_half_width(
-    gap: float, expected: bool
-) -> None:
+def test_perpendicular_cars_touch_at_half_length_and_half_width(gap: float, expected: bool) -> None:
     assert overlap((0.0, 0.0, 0.0), (gap, 0.0, math.pi / 2)) is expected
     assert overlap((0.0, 0.0, 0.0), (0.0, gap, math.pi / 2)) is expected
 

@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Starts the real node executables as processes of their own, and takes them down again."""
+
+import json
+import os
+import signal
+import socket
+import subprocess
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from ament_index_python.packages import PackageNotFoundError, get_package_prefix
+
+from risk_dqn_planner.errors import ConfigurationError, PlannerError
+
+ParameterValue = bool | int | float | str | Sequence[int]
+
+# Participants started together miss each other's first announcement now and then; with Fast DDS's
+# own pace the next one comes seconds later.
+_QUICK_DISCOVERY = """<?xml version="1.0" encoding="UTF-8"?>
+<dds xmlns="http://www.eprosima.com"><profiles>
+  <participant profile_name="quick_discovery" is_default_profile="true"><rtps><builtin>
+    <discovery_config>
+      <leaseAnnouncement><sec>0</sec><nanosec>300000000</nanosec></leaseAnnouncement>
+      <initialAnnouncements>
+        <count>20</count><period><sec>0</sec><nanosec>50000000</nanosec></period>
+      </initialAnnouncements>
+    </discovery_config>
+  </builtin></rtps></participant>
+</profiles></dds>
+"""
+_DOMAINS = 100  # ports of higher domains may be given to any program by the system
+
+
+class NodeDiedError(PlannerError):
+    """A node ended although nobody asked it to."""
+
+
+def _is_free(domain_id: int) -> bool:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        try:
+            # Where the first participant of the domain listens (DDS-RTPS 9.6.1.1).
+            probe.bind(("", 7400 + 250 * domain_id + 10))
+        except OSError:
+            return False
+    return True
+
+
+def free_domain_id() -> int:
+    """Find a ROS domain that nobody on this computer uses; processes start looking apart."""
+    for offset in range(_DOMAINS):
+        domain_id = 1 + (os.getpid() + offset) % _DOMAINS
+        if _is_free(domain_id):
+            return domain_id
+    raise ConfigurationError(f"none of the ROS domains 1 to {_DOMAINS} is free on this computer")
+
+
+def isolate(domain_id: int, profile: Path) -> None:
+    """Keep this process and its children to one domain on this computer; before rclpy.init."""
+    profile.parent.mkdir(parents=True, exist_ok=True)
+    profile.write_text(_QUICK_DISCOVERY, "utf-8")
+    os.environ.update(
+        ROS_DOMAIN_ID=str(domain_id),
+        ROS_AUTOMATIC_DISCOVERY_RANGE="LOCALHOST",
+        FASTRTPS_DEFAULT_PROFILES_FILE=str(profile.resolve()),
+    )
+
+
+@dataclass(frozen=True)
+class NodeCommand:
+    """What to run: an installed executable, its parameters and remappings."""
+
+    package: str
+    executable: str
+    parameters: Mapping[str, ParameterValue] = field(default_factory=dict)
+    remappings: Mapping[str, str] = field(default_factory=dict)
+
+    def arguments(self) -> list[str]:
+        """Command line; the file is the one that `ros2 run` executes.
+
+        Raises:
+            ConfigurationError: the executable is not installed.
+        """
+        try:
+            prefix = Path(get_package_prefix(self.package))
+        except PackageNotFoundError as error:
+            raise ConfigurationError(
+                f"package {self.package} is not installed, build the workspace and source it"
+            ) from error
+        executable = prefix / "lib" / self.package / self.executable
+        if not executable.is_file():
+            raise ConfigurationError(f"{executable} does not exist, build the workspace")
+        command = [str(executable), "--ros-args"]
+        for name, value in self.parameters.items():
+            # JSON is YAML, which is what the parameter parser reads.
+            command += ["-p", f"{name}:={json.dumps(value)}"]
+        for private, plain in self.remappings.items():
+            command += ["-r", f"{private}:={plain}"]
+        return command
+
+
+class NodeProcess:
+    """A running node; what it prints goes to a file."""
+
+    def __init__(self, command: NodeCommand, log: Path) -> None:
+        self.name = command.executable
+        self._log = log
+        log.parent.mkdir(parents=True, exist_ok=True)
+        with log.open("wb") as output:
+            # A group of its own: a Ctrl-C reaches the node through `stop`, in order.
+            self._process = subprocess.Popen(  # noqa: S603 (the executable is ours)
+                command.arguments(),
+                stdin=subprocess.DEVNULL,
+                stdout=output,
+                stderr=subprocess.STDOUT,
+                start_new_session=True,
+            )
+
+    @property
+    def exit_code(self) -> int | None:
+        """Exit code, None while the node runs."""
+        return self._process.poll()
+
+    def output(self) -> str:
+        """Everything the node has printed so far."""
+        return self._log.read_text("utf-8", errors="replace")
+
+    def check(self) -> None:
+        """Raise NodeDiedError with the node's last line if it has ended."""
+        if self.exit_code is not None:
+            lines = self.output().strip().splitlines() or ["without a word"]
+            raise NodeDiedError(f"{self.name} ended with code {self.exit_code}: {lines[-1]}")
+
+    def stop(self, patience_s: float = 5.0) -> int:
+        """Interrupt the node, ever less politely, and return its exit code."""
+        for request in (signal.SIGINT, signal.SIGTERM, signal.SIGKILL):
+            if self._process.poll() is not None:
+                break
+            os.killpg(self._process.pid, request)
+            try:
+                self._process.wait(patience_s)
+            except subprocess.TimeoutExpired:
+                continue
+        return self._process.wait()

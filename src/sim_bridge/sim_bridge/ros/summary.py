@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What came of a run: one result an episode, as JSON and as a table."""
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from intersection_msgs.msg import EpisodeEvent
+from rich.table import Table
+
+RESULTS = {
+    EpisodeEvent.SUCCESS: "success",
+    EpisodeEvent.COLLISION: "collision",
+    EpisodeEvent.TIMEOUT: "timeout",
+}
+ACTIONS = ("stop", "slow", "fast")
+_COLORS = {"success": "green", "collision": "red", "timeout": "yellow"}
+
+
+@dataclass(frozen=True)
+class EpisodeResult:
+    """How one episode went; `action_counts` are decision steps by action."""
+
+    seed: int
+    result: str
+    duration_s: float
+    mean_speed_mps: float
+    action_counts: dict[str, int]
+    late_decisions: int
+
+
+@dataclass(frozen=True)
+class RunSummary:
+    """Everything needed to run the same again, and what came of it."""
+
+    map: str
+    route: tuple[int, ...]
+    origin: tuple[float, float]
+    projector: str
+    policy: str
+    policy_hash: str
+    scenario: str
+    episodes: tuple[EpisodeResult, ...]
+
+    def write(self, file: Path) -> None:
+        """Write as JSON."""
+        file.write_text(json.dumps(asdict(self), indent=2) + "\n", "utf-8")
+
+
+def episode_result(event: EpisodeEvent) -> EpisodeResult:
+    """Convert the event that ended an episode."""
+    counts = {name: int(n) for name, n in zip(ACTIONS, event.action_counts, strict=True)}
+    return EpisodeResult(
+        seed=event.seed,
+        result=RESULTS[event.event],
+        duration_s=round(event.duration_s, 3),
+        mean_speed_mps=round(event.mean_speed_mps, 3),
+        action_counts=counts,
+        late_decisions=event.late_decisions,
+    )
+
+
+def results_table(episodes: Sequence[EpisodeResult], title: str) -> Table:
+    """Lay out the episodes, and their totals in a last row."""
+    table = Table(title=title)
+    table.add_column("seed", justify="right")
+    table.add_column("result")
+    for name in ("duration [s]", "mean speed [m/s]", *ACTIONS, "late"):
+        table.add_column(name, justify="right")
+    for episode in episodes:
+        color = _COLORS[episode.result]
+        table.add_row(
+            str(episode.seed),
+            f"[{color}]{episode.result}[/{color}]",
+            f"{episode.duration_s:.1f}",
+            f"{episode.mean_speed_mps:.2f}",
+            *(str(episode.action_counts[name]) for name in ACTIONS),
+            str(episode.late_decisions),
+        )
+    if episodes:
+        table.add_section()
+        table.add_row(*_totals(episodes))
+    return table
+
+
+def _totals(episodes: Sequence[EpisodeResult]) -> list[str]:
+    successes = sum(episode.result == "success" for episode in episodes)
+    driven_m = sum(episode.mean_speed_mps * episode.duration_s for episode in episodes)
+    duration_s = sum(episode.duration_s for episode in episodes)
+    return [
+        "all",
+        f"{successes}/{len(episodes)} success",
+        f"{duration_s:.1f}",
+        f"{driven_m / duration_s if duration_s > 0.0 else 0.0:.2f}",
+        *(str(sum(episode.action_counts[name] for episode in episodes)) for name in ACTIONS),
+        str(sum(episode.late_decisions for episode in episodes)),
+    ]

@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: Apache-2.0
+import threading
+import time
+
+import pytest
+from intersection_msgs.msg import Decision, Situation
+
+from sim_bridge.ros.pacing import (
+    SECOND_NS,
+    LockStep,
+    Mailbox,
+    RealTime,
+    WallPace,
+    to_ns,
+    to_stamp,
+)
+
+LONG_S = 30.0  # a test that waits this long has failed
+
+
+class FakeLink:
+    """Stands in for PlannerLink; answers with what the test prepared for each time."""
+
+    def __init__(self) -> None:
+        self.situations: Mailbox[Situation] = Mailbox()
+        self.decisions: Mailbox[Decision] = Mailbox()
+        self.answers: dict[int, list[Decision]] = {}
+        self.log: list[str] = []
+        self.closed = False
+
+    def tick(self, stamp_ns: int) -> None:
+        newest, _ = self.situations.newest()
+        self.log.append(f"clock {stamp_ns} with situation {newest}")
+        for answer in self.answers.get(stamp_ns, []):
+            self.decisions.put(to_ns(answer.header.stamp), answer)
+
+    def close(self) -> None:
+        self.closed = True
+        self.situations.close()
+        self.decisions.close()
+
+
+def decision(stamp_ns: int, situation_ns: int) -> Decision:
+    message = Decision(action=Decision.FAST, situation_stamp=to_stamp(situation_ns))
+    message.header.stamp = to_stamp(stamp_ns)
+    return message
+
+
+def test_stamps_survive_the_way_to_a_message_and_back() -> None:
+    assert to_ns(to_stamp(123_456_789_012)) == 123_456_789_012
+    assert to_stamp(1_500_000_000).nanosec == 500_000_000
+
+
+def test_a_mailbox_hands_out_only_the_stamp_that_was_asked_for() -> None:
+    box: Mailbox[str] = Mailbox()
+    box.put(5, "five")
+    assert box.wait(5, 0.0) == "five"
+    assert box.wait(4, LONG_S) is None  # already past: no use in waiting
+    assert box.wait(6, 0.0) is None
+    assert box.newest() == (5, "five")
+
+
+def test_a_mailbox_wakes_its_reader() -> None:
+    box: Mailbox[str] = Mailbox()
+    threading.Timer(0.05, box.put, (7, "seven")).start()
+    assert box.wait(7, LONG_S) == "seven"
+
+
+def test_a_closed_mailbox_keeps_nobody_waiting() -> None:
+    box: Mailbox[str] = Mailbox()
+    threading.Timer(0.05, box.close).start()
+    started = time.monotonic()
+    assert box.wait(1, LONG_S) is None
+    assert time.monotonic() - started < LONG_S / 2
+
+
+def test_in_lock_step_the_clock_waits_for_the_situation() -> None:
+    link = FakeLink()
+    threading.Timer(0.05, link.situations.put, (100, Situation())).start()
+    LockStep(link, WallPace(0.0), LONG_S).reach(100)
+    assert link.log == ["clock 100 with situation 100"]
+
+
+def test_in_lock_step_a_planner_that_stays_silent_is_waited_for_only_so_long() -> None:
+    link = FakeLink()
+    pacing = LockStep(link, WallPace(0.0), 0.05)
+    pacing.reach(100)
+    assert link.log == ["clock 100 with situation -1"]
+    assert pacing.decision(100) is None
+
+
+def test_in_lock_step_only_a_decision_on_the_present_situation_counts() -> None:
+    link = FakeLink()
+    pacing = LockStep(link, WallPace(0.0), 0.5)
+    link.answers = {100: [decision(100, 100)], 200: [decision(200, 150)]}
+    link.tick(100)
+    assert pacing.decision(100) == decision(100, 100)
+    link.tick(200)
+    assert pacing.decision(200) is None
+
+
+def test_in_lock_step_a_lost_clock_message_is_sent_again() -> None:
+    link = FakeLink()
+    link.answers = {100: [decision(100, 100)]}
+    # `reach` has ticked, but nobody heard it.
+    assert LockStep(link, WallPace(0.0), LONG_S).decision(100) == decision(100, 100)
+
+
+def test_in_real_time_the_newest_decision_counts_until_it_is_a_second_old() -> None:
+    link = FakeLink()
+    pacing = RealTime(link, WallPace(0.0))
+    assert pacing.decision(SECOND_NS * 2) is None
+    link.decisions.put(SECOND_NS, decision(SECOND_NS, 0))
+    assert pacing.decision(SECOND_NS * 2) == decision(SECOND_NS, 0)
+    assert pacing.decision(SECOND_NS * 2 + 1) is None
+
+
+@pytest.mark.parametrize(("factor", "least_s"), [(1.0, 0.2), (4.0, 0.05), (0.0, 0.0)])
+def test_simulated_time_runs_at_most_at_the_given_factor(factor: float, least_s: float) -> None:
+    pace = WallPace(factor)
+    started = time.monotonic()
+    for stamp_ns in range(0, 300_000_000, 100_000_000):
+        pace.reach(stamp_ns)
+    elapsed_s = time.monotonic() - started
+    assert least_s <= elapsed_s < least_s + 1.0

@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Puts the lane-based situation together: one call for each message of perceived objects."""
+
+import numpy as np
+
+from risk_dqn_planner.intersection.model import ConflictKind, IntersectionModel
+from risk_dqn_planner.situation.config import SituationConfig
+from risk_dqn_planner.situation.ego import ego_progress
+from risk_dqn_planner.situation.inputs import (
+    EgoPose,
+    ObjectArrays,
+    check_ego,
+    check_objects,
+    check_visible_area,
+)
+from risk_dqn_planner.situation.matching import in_footprint_kernel, match_kernel
+from risk_dqn_planner.situation.occlusion import hidden_distances_kernel
+from risk_dqn_planner.situation.paths import path_table
+from risk_dqn_planner.situation.situations import Floats, Situations, empty_situations
+
+
+class SituationBuilder:
+    """Relates what is perceived to the lanes of one intersection model."""
+
+    def __init__(self, model: IntersectionModel, config: SituationConfig | None = None) -> None:
+        self.model = model
+        self.config = config or SituationConfig()
+        self._table = path_table(model)
+
+    def build(self, ego: EgoPose, objects: ObjectArrays, visible_area: Floats) -> Situations:
+        """Return the situation as a batch of one, vehicles ordered by (id, lane).
+
+        visible_area: simple polygon (K, 2) in the map frame. An object whose centre lies in the
+        ego's footprint is the ego itself and is left out.
+
+        Raises:
+            InputError: an input is not finite or not plausible; names which.
+            EgoPoseError: the ego is off its route or faces the wrong way.
+        """
+        check_ego(ego)
+        check_objects(objects)
+        check_visible_area(visible_area)
+        ego_s = ego_progress(self.model, ego, self.config)
+        lanes = self.model.lanes
+        hidden = hidden_distances_kernel(
+            self._table,
+            len(lanes),
+            np.ascontiguousarray(visible_area, dtype=np.float64),
+            self.config.sensor_range_m,
+        )
+        filled = self._with_vehicles(ego, objects)
+        return filled._replace(
+            stop_line_distance_m=np.array([self.model.stop_line.position_m - ego_s]),
+            goal_distance_m=np.array([self.model.goal_m - ego_s]),
+            ego_speed_mps=np.array([ego.speed_mps]),
+            lane_mask=np.ones((1, len(lanes)), dtype=np.bool_),
+            lane_id=np.array([[lane.lane_id for lane in lanes]], dtype=np.int64),
+            lane_merging=np.array([[lane.kind == ConflictKind.MERGING for lane in lanes]]),
+            lane_ego_distance_m=np.array([[lane.ego_zone_center_m - ego_s for lane in lanes]]),
+            lane_hidden_distance_m=hidden[None, :],
+            lane_speed_limit_mps=np.array([[lane.speed_limit_mps for lane in lanes]]),
+            lane_ego_zone_m=np.array([[lane.ego_zone_length_m for lane in lanes]]),
+            lane_zone_m=np.array([[lane.zone_length_m for lane in lanes]]),
+        )
+
+    def _with_vehicles(self, ego: EgoPose, objects: ObjectArrays) -> Situations:
+        config = self.config
+        who, lane, distance, speed = match_kernel(
+            self._table, objects, config.lateral_tolerance_m, config.max_heading_difference_rad
+        )
+        kept = [k for k, i in enumerate(who) if not self._is_ego(ego, objects, i)]
+        order = np.array(sorted(kept, key=lambda k: (objects.id[who[k]], lane[k])), dtype=np.int64)
+        # At least one place, so that nobody has to think of arrays without entries.
+        situations = empty_situations(1, max(len(order), 1), len(self.model.lanes))
+        count = len(order)
+        situations.vehicle_mask[0, :count] = True
+        situations.vehicle_id[0, :count] = objects.id[who[order]]
+        situations.vehicle_lane[0, :count] = lane[order]
+        situations.vehicle_distance_m[0, :count] = distance[order]
+        situations.vehicle_speed_mps[0, :count] = speed[order]
+        return situations
+
+    def _is_ego(self, ego: EgoPose, objects: ObjectArrays, index: int) -> bool:
+        size = self.model.ego_dimensions
+        return in_footprint_kernel(
+            objects.x_m[index],
+            objects.y_m[index],
+            ego.x_m,
+            ego.y_m,
+            ego.heading_rad,
+            size.length_m,
+            size.width_m,
+        )

@@ -1,0 +1,42 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How far the ego is along its route."""
+
+import math
+
+from risk_dqn_planner.errors import EgoPoseError
+from risk_dqn_planner.intersection.model import IntersectionModel
+from risk_dqn_planner.situation.config import SituationConfig
+from risk_dqn_planner.situation.inputs import EgoPose
+from risk_dqn_planner.situation.matching import turned_by_kernel
+
+
+def ego_progress(model: IntersectionModel, ego: EgoPose, config: SituationConfig) -> float:
+    """Return the ego's arc length on its path [m].
+
+    Raises:
+        EgoPoseError: the ego is beside its path, before or behind it, or faces the wrong way.
+    """
+    path = model.ego_path.centerline
+    limit = config.max_ego_heading_difference_rad
+    s, lateral, heading = path.project(ego.x_m, ego.y_m, ego.heading_rad, limit)
+    # With its heading ignored the ego may well be on the path: then it only faces the wrong way.
+    nearest = path.project(ego.x_m, ego.y_m)
+    if abs(nearest.lateral_m) > config.max_ego_offset_m:
+        raise EgoPoseError(
+            f"the ego is {abs(nearest.lateral_m):.1f} m beside its route, "
+            f"expected at most {config.max_ego_offset_m:g} m"
+        )
+    if nearest.s < 0.0:
+        raise EgoPoseError(f"the ego is {-nearest.s:.1f} m before the start of its route")
+    if nearest.s > path.length_m:
+        beyond = nearest.s - path.length_m
+        raise EgoPoseError(f"the ego is {beyond:.1f} m beyond the end of its route")
+    if abs(lateral) > config.max_ego_offset_m:
+        heading = nearest.heading_rad
+    turned = turned_by_kernel(ego.heading_rad, heading)
+    if turned > limit:
+        raise EgoPoseError(
+            f"the ego is turned {math.degrees(turned):.0f} degrees away from its route, "
+            f"expected at most {math.degrees(limit):.0f}"
+        )
+    return s

@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The simulator as a learning problem: states, rewards, episodes one after the other."""

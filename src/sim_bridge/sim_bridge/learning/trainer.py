@@ -1,0 +1,154 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The training loop: act, remember, learn. It yields; what evaluates, logs or saves is outside.
+
+Its whole state is in `state_dict`, and nothing in it depends on the clock, so a run that was
+interrupted at any yield goes on to the identical result.
+"""
+
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from risk_dqn_planner.decision import Action
+from sim_bridge.environment.interface import Environment, Outcome
+from sim_bridge.learning.config import TrainingConfig
+from sim_bridge.learning.learner import Learner
+from sim_bridge.learning.n_step import NStepReturns
+from sim_bridge.learning.replay import PrioritizedReplay, Transitions
+
+
+class Progress(NamedTuple):
+    """Where a run stands, and what happened since the last report.
+
+    steps, episodes, updates: since the beginning. ended (4,): training episodes since the last
+    report by Outcome. loss: mean over the updates since then, NaN if there were none.
+    """
+
+    steps: int
+    episodes: int
+    updates: int
+    epsilon: float
+    ended: NDArray[np.int64]
+    loss: float
+
+
+class Trainer:
+    """One run of the algorithm on one environment; `seed` decides every random number of it."""
+
+    def __init__(
+        self, config: TrainingConfig, environment: Environment, learner: Learner, seed: int
+    ) -> None:
+        self._config = config
+        self._environment = environment
+        self._learner = learner
+        self._replay = PrioritizedReplay(config.replay, environment.features, seed)
+        self._returns = NStepReturns(
+            environment.batch, config.n_step, config.gamma, environment.features
+        )
+        self._random = np.random.default_rng([seed, 1])
+        self._states = environment.reset()
+        self._steps = 0
+        self._episodes = 0
+        self._updates = 0
+        self._reports = 0
+        self._restart_report()
+
+    @property
+    def learner(self) -> Learner:
+        """The learner, whose network is the policy so far."""
+        return self._learner
+
+    @property
+    def progress(self) -> float:
+        """Share of the run that is over, in [0, 1]."""
+        return min(self._steps / self._config.steps, 1.0)
+
+    def run(self) -> Iterator[Progress]:
+        """Train to the end; yield after every so many episodes, and at the end."""
+        every = self._config.evaluation.every_episodes
+        while self._steps < self._config.steps:
+            self._advance()
+            over = self._steps >= self._config.steps
+            if over or self._episodes // every > self._reports:
+                self._reports = self._episodes // every
+                yield self._report()
+
+    def _advance(self) -> None:
+        """Make one step in every environment and the updates that belong to it."""
+        actions = self._choose_actions()
+        step = self._environment.step(actions)
+        single = Transitions(self._states, actions, step.reward, step.discount, step.final_states)
+        self._replay.add(self._returns.push(single, step.ended))
+        # The environment may write into the same memory with its next step.
+        self._states = step.states.copy()
+        self._steps += self._environment.batch
+        self._ended += np.bincount(step.outcome, minlength=len(Outcome))
+        self._episodes += int(step.ended.sum())
+        if len(self._replay) >= self._config.warmup_steps:
+            for _ in range(self._config.updates_per_step):
+                self._learn()
+
+    def _choose_actions(self) -> NDArray[np.int64]:
+        """Choose epsilon-greedily for each environment; as many random numbers each time."""
+        batch = self._environment.batch
+        explore = self._random.random(batch) < self._config.exploration.epsilon(self.progress)
+        actions = self._random.integers(0, len(Action), batch)
+        if explore.all():
+            return actions
+        greedy = self._learner.q_values(self._states).argmax(axis=1)
+        return np.where(explore, actions, greedy)
+
+    def _learn(self) -> None:
+        drawn = self._replay.sample(
+            self._config.batch_size, self._config.replay.beta(self.progress)
+        )
+        errors, loss = self._learner.update(drawn, self.progress)
+        self._replay.update_priorities(drawn.indices, errors)
+        self._updates += 1
+        self._loss_sum += loss
+        self._loss_count += 1
+
+    def _report(self) -> Progress:
+        report = Progress(
+            steps=self._steps,
+            episodes=self._episodes,
+            updates=self._updates,
+            epsilon=self._config.exploration.epsilon(self.progress),
+            ended=self._ended,
+            loss=self._loss_sum / self._loss_count if self._loss_count else float("nan"),
+        )
+        self._restart_report()
+        return report
+
+    def _restart_report(self) -> None:
+        self._ended = np.zeros(len(Outcome), dtype=np.int64)
+        self._loss_sum = 0.0
+        self._loss_count = 0
+
+    def state_dict(self) -> dict[str, Any]:
+        """Return everything that `load_state_dict` needs to go on identically.
+
+        Valid between two reports of `run`.
+        """
+        return {
+            "learner": self._learner.state_dict(),
+            "replay": self._replay.state_dict(),
+            "returns": self._returns.state_dict(),
+            "environment": self._environment.state_dict(),
+            "random": self._random.bit_generator.state,
+            "states": self._states.copy(),
+            "counts": (self._steps, self._episodes, self._updates, self._reports),
+        }
+
+    def load_state_dict(self, state: dict[str, Any]) -> None:
+        """Take over an interrupted run of the same configuration."""
+        self._learner.load_state_dict(state["learner"])
+        self._replay.load_state_dict(state["replay"])
+        self._returns.load_state_dict(state["returns"])
+        self._environment.load_state_dict(state["environment"])
+        self._random.bit_generator.state = state["random"]
+        self._states = state["states"].copy()
+        self._steps, self._episodes, self._updates, self._reports = state["counts"]
+        self._restart_report()

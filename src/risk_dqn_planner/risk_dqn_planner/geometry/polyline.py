@@ -21,6 +21,12 @@ Floats = NDArray[np.float64]
 MIN_POINT_SPACING_M = 1e-6
 
 
+def arc_lengths(points: Floats) -> Floats:
+    """Return the arc length (N,) in the plane at each of the points (N, 2) or (N, 3) [m]."""
+    step = np.diff(points[:, :2], axis=0)
+    return np.concatenate(([0.0], np.cumsum(np.hypot(step[:, 0], step[:, 1]))))
+
+
 @kernel
 def segment_index_kernel(s: Floats, at: float) -> int:
     """Return the segment that holds arc length `at`; the first or the last one beyond the ends."""
@@ -136,8 +142,7 @@ class Polyline:
             raise MapError(f"a polyline needs two distinct points, got {len(kept)}")
         xy = np.ascontiguousarray(given[kept])
         step = np.diff(xy, axis=0)
-        s = np.concatenate(([0.0], np.cumsum(np.hypot(step[:, 0], step[:, 1]))))
-        return cls(xy, s, np.arctan2(step[:, 1], step[:, 0]))
+        return cls(xy, arc_lengths(xy), np.arctan2(step[:, 1], step[:, 0]))
 
     @property
     def length_m(self) -> float:

@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: Apache-2.0
+# Every target sets up what it needs first, and does nothing about it when nothing changed.
+#   PYTHON=/path/to/python   the Python that carries ROS (otherwise the first suitable one is taken)
+#   ARGS='...'               more arguments for what the target runs
+
+SHELL := /bin/bash
+MAKEFLAGS += --no-print-directory
+.DEFAULT_GOAL := help
+
+HOST_PYTHON ?= python3
+ifeq ($(shell command -v $(HOST_PYTHON)),)
+$(error $(HOST_PYTHON) was not found; install Python 3.10, 3.11 or 3.12, or pass one as HOST_PYTHON=/path/to/python)
+endif
+BOOTSTRAP := $(HOST_PYTHON) tools/bootstrap.py
+WITH_TOOLS := $(BOOTSTRAP) --no-build --
+WITH_ROS := $(BOOTSTRAP) --
+SIMULATION := install/sim_bridge/lib/sim_bridge
+PYTHON_SOURCES := src/risk_dqn_planner src/sim_bridge tests tools
+TYPED_SOURCES := src/risk_dqn_planner/risk_dqn_planner src/sim_bridge/sim_bridge tools
+
+# --option='value' for a variable given on the command line of make, nothing otherwise: a variable
+# of that name in the user's environment means something else.
+option = $(if $(filter command line,$(origin $(2))),$(1)='$(subst ','\'',$($(2)))')
+RUN_OPTIONS = $(call option,--map,MAP) $(call option,--route,ROUTE) $(call option,--origin,ORIGIN) \
+  $(call option,--projector,PROJECTOR) $(call option,--policy,POLICY) \
+  $(call option,--scenario,SCENARIO) $(call option,--episodes,EPISODES) $(call option,--seed,SEED) \
+  $(call option,--rate,RATE) $(call option,--out,OUT)
+
+.PHONY: help setup demo test replay bags maps bench shell format lint types check clean distclean
+
+help: ## list the targets
+	@echo 'make TARGET, where TARGET is one of'
+	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "  %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+
+setup: ## set up ROS, Python and the built packages, and run nothing
+	@$(BOOTSTRAP)
+
+demo: ## drive episodes over DDS [MAP ROUTE ORIGIN PROJECTOR POLICY SCENARIO EPISODES SEED RATE OUT]
+	@$(WITH_ROS) $(SIMULATION)/demo $(RUN_OPTIONS) $(ARGS)
+
+test: ## run all tests, those with real nodes too [ARGS='-k name']
+	@$(WITH_ROS) python -m pytest $(ARGS)
+
+replay: ## feed a bag to the real nodes and compare decisions: BAG=bags/...
+	@$(if $(BAG),,echo 'error: say which bag, for example make replay BAG=bags/four_way' >&2; exit 2)
+	@$(WITH_ROS) $(SIMULATION)/replay '$(BAG)' $(ARGS)
+
+bags: ## record the bags in bags/ again
+	@$(WITH_ROS) $(SIMULATION)/record $(ARGS)
+
+maps: ## draw the project's own maps again
+	@$(WITH_ROS) $(SIMULATION)/draw_maps $(ARGS)
+
+bench: ## run the benchmarks
+	@$(WITH_ROS) bash -c 'for script in benchmarks/*.py; do python "$$script" || exit; done'
+
+shell: ## open a shell in which the nodes run [ARGS="-c 'command'"]
+	@$(WITH_ROS) bash --rcfile tools/shell.bashrc $(ARGS)
+
+format: ## format the Python sources
+	@$(WITH_TOOLS) ruff format $(PYTHON_SOURCES)
+	@$(WITH_TOOLS) ruff check --select I --fix $(PYTHON_SOURCES)
+
+lint: ## check style and formatting
+	@$(WITH_TOOLS) ruff check .
+	@$(WITH_TOOLS) ruff format --check .
+
+types: ## check types, strictly
+	@MYPYPATH=tools $(WITH_TOOLS) mypy $(TYPED_SOURCES)
+
+check: lint types test ## lint, types and test
+
+clean: ## remove what was built, recorded and cached, except .venv
+	rm -rf build install log out .hypothesis .mypy_cache .pytest_cache .ruff_cache
+	find src tests tools -name __pycache__ -type d -prune -exec rm -rf {} +
+
+distclean: clean ## remove .venv too
+	rm -rf .venv

@@ -11,7 +11,8 @@ from rclpy.qos import QoSProfile
 from rclpy.serialization import deserialize_message
 
 from risk_dqn_planner.errors import PlannerError
-from sim_bridge.ros.pacing import DECISION_PERIOD_NS, to_ns
+from risk_dqn_planner.ros.conversions import to_ns
+from sim_bridge.ros.pacing import DECISION_PERIOD_NS
 from sim_bridge.ros.recording import Stored, stamp_of
 from sim_bridge.ros.topics import ALL, DECISION, EPISODE, ROUTE, Topic
 
@@ -31,8 +32,8 @@ class Observer:
         self._changed = threading.Condition()
         self._messages: list[Stored] = []
         self._newest_ns: dict[str, int] = {}
-        self._route: Stored | None = None
         self._end: EpisodeEvent | None = None
+        self._node = node
         for topic in ALL:
             qos = QoSProfile(
                 depth=_DEPTH, reliability=topic.qos.reliability, durability=topic.qos.durability
@@ -40,6 +41,10 @@ class Observer:
             node.create_subscription(
                 topic.message, topic.name, self._listener(topic), qos, raw=True
             )
+
+    def connected(self) -> bool:
+        """Whether somebody speaks on every topic."""
+        return all(self._node.count_publishers(topic.name) > 0 for topic in ALL)
 
     def _listener(self, topic: Topic) -> Callable[[bytes], None]:
         def listen(data: bytes) -> None:

@@ -10,38 +10,34 @@ time count from time zero, hence decisions fall on multiples of the period.
 
 import threading
 import time
+from collections.abc import Callable
 from typing import Generic, Protocol, TypeVar
 
-from builtin_interfaces.msg import Time
 from intersection_msgs.msg import Decision, Situation
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rosgraph_msgs.msg import Clock
 
+from risk_dqn_planner.ros.conversions import SECOND_NS, to_ns, to_stamp
 from risk_dqn_planner.ros.qos import NEWEST
 
-SECOND_NS = 1_000_000_000
 DECISION_PERIOD_NS = SECOND_NS // 2
 # A decision older than this no longer moves the ego when the simulator runs in real time.
 OLDEST_DECISION_S = 1.0
 # Nodes read /clock best effort: a lost time is sent again while an answer to it is awaited.
 _CLOCK_AGAIN_S = 0.1
+_FIRST_ANSWER_S = 1.0
+_LOOK_AGAIN_S = 0.02
+# Between episodes this much time passes without inputs, so that the planner forgets the last one.
+EPISODE_GAP_NS = 2 * SECOND_NS
+# The first episode starts at a multiple of this, however long the planner took to come up.
+_START_NS = 10 * SECOND_NS
 
 Message = TypeVar("Message")
 
 
-def to_ns(stamp: Time) -> int:
-    """Nanoseconds of a builtin_interfaces/Time."""
-    return int(stamp.sec) * SECOND_NS + int(stamp.nanosec)
-
-
-def to_stamp(time_ns: int) -> Time:
-    """A builtin_interfaces/Time of nanoseconds."""
-    return Time(sec=time_ns // SECOND_NS, nanosec=time_ns % SECOND_NS)
-
-
 class Mailbox(Generic[Message]):
-    """The newest message of a topic, with its stamp; one thread delivers, another waits."""
+    """The newest message of a topic, by its stamp; one thread delivers, another waits."""
 
     def __init__(self) -> None:
         self._changed = threading.Condition()
@@ -50,9 +46,10 @@ class Mailbox(Generic[Message]):
         self._closed = False
 
     def put(self, stamp_ns: int, message: Message) -> None:
-        """Deliver a message and wake whoever waits."""
+        """Deliver a message and wake whoever waits; an older one than the newest is dropped."""
         with self._changed:
-            self._stamp_ns, self._message = stamp_ns, message
+            if stamp_ns >= self._stamp_ns:
+                self._stamp_ns, self._message = stamp_ns, message
             self._changed.notify_all()
 
     def close(self) -> None:
@@ -118,9 +115,15 @@ class PlannerLink:
         self.situations: Mailbox[Situation] = Mailbox()
         self.decisions: Mailbox[Decision] = Mailbox()
         self.closed = False
+        self._met_ns = 0
+        self._node = node
         self._clock = node.create_publisher(Clock, "/clock", QoSProfile(depth=10))
-        node.create_subscription(Situation, situation_topic, self._on_situation, NEWEST)
-        node.create_subscription(Decision, decision_topic, self._on_decision, NEWEST)
+        self._situations_from = node.create_subscription(
+            Situation, situation_topic, self._on_situation, NEWEST
+        )
+        self._decisions_from = node.create_subscription(
+            Decision, decision_topic, self._on_decision, NEWEST
+        )
 
     def _on_situation(self, message: Situation) -> None:
         self.situations.put(to_ns(message.header.stamp), message)
@@ -131,6 +134,30 @@ class PlannerLink:
     def tick(self, stamp_ns: int) -> None:
         """Publish the time."""
         self._clock.publish(Clock(clock=to_stamp(stamp_ns)))
+
+    def connected(self) -> bool:
+        """Whether somebody hears the clock and both answers can be heard."""
+        topics = (self._situations_from.topic_name, self._decisions_from.topic_name)
+        return self._clock.get_subscription_count() >= len(topics) and all(
+            self._node.count_publishers(topic) > 0 for topic in topics
+        )
+
+    def meet(self, inputs_are_read: Callable[[], bool], timeout_s: float) -> int | None:
+        """Let time pass until the policy answers to what the situation node says.
+
+        Returns a time [ns] at which an episode may start, None if the planner stays silent.
+        """
+        deadline = time.monotonic() + timeout_s
+        while time.monotonic() < deadline and not self.closed:
+            if not (self.connected() and inputs_are_read()):
+                time.sleep(_LOOK_AGAIN_S)
+                continue
+            self._met_ns += DECISION_PERIOD_NS
+            self.tick(self._met_ns)
+            decision = self.decisions.wait(self._met_ns, _FIRST_ANSWER_S)
+            if decision is not None and decision.reason != Decision.NO_SITUATION:
+                return (self._met_ns + EPISODE_GAP_NS) // _START_NS * _START_NS + _START_NS
+        return None
 
     def close(self) -> None:
         """Stop waiting for answers."""
@@ -146,6 +173,7 @@ class LockStep:
         self._link = link
         self._pace = pace
         self._timeout_s = timeout_s
+        self._held: Decision | None = None
 
     def reach(self, stamp_ns: int) -> None:
         """Wait for the situation of the frame, then let the clock show the frame's time."""
@@ -154,11 +182,15 @@ class LockStep:
         self._link.tick(stamp_ns)
 
     def decision(self, stamp_ns: int) -> Decision | None:
-        """Wait for the decision taken at this time on the situation of this time."""
-        decision = self._await_decision(stamp_ns)
-        if decision is None or to_ns(decision.situation_stamp) != stamp_ns:
-            return None
-        return decision
+        """Wait for the decision taken at this time on the situation of this time.
+
+        Between multiples of the period the last one holds.
+        """
+        if stamp_ns % DECISION_PERIOD_NS == 0:
+            found = self._await_decision(stamp_ns)
+            late = found is None or to_ns(found.situation_stamp) != stamp_ns
+            self._held = None if late else found
+        return self._held
 
     def skip_to(self, stamp_ns: int) -> None:
         """Jump to the time; the policy's decision then (there is no input) is awaited."""
@@ -206,3 +238,10 @@ class RealTime:
     def close(self) -> None:
         """Stop waiting."""
         self._link.close()
+
+
+def pass_time(pacing: Pacing, from_ns: int, until_ns: int) -> None:
+    """Let the time between two frames pass, each decision between them awaited in its turn."""
+    first_ns = (from_ns // DECISION_PERIOD_NS + 1) * DECISION_PERIOD_NS
+    for stamp_ns in range(first_ns, until_ns, DECISION_PERIOD_NS):
+        pacing.skip_to(stamp_ns)

@@ -7,6 +7,7 @@ import signal
 import socket
 import subprocess
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -16,20 +17,6 @@ from risk_dqn_planner.errors import ConfigurationError, PlannerError
 
 ParameterValue = bool | int | float | str | Sequence[int]
 
-# Participants started together miss each other's first announcement now and then; with Fast DDS's
-# own pace the next one comes seconds later.
-_QUICK_DISCOVERY = """<?xml version="1.0" encoding="UTF-8"?>
-<dds xmlns="http://www.eprosima.com"><profiles>
-  <participant profile_name="quick_discovery" is_default_profile="true"><rtps><builtin>
-    <discovery_config>
-      <leaseAnnouncement><sec>0</sec><nanosec>300000000</nanosec></leaseAnnouncement>
-      <initialAnnouncements>
-        <count>20</count><period><sec>0</sec><nanosec>50000000</nanosec></period>
-      </initialAnnouncements>
-    </discovery_config>
-  </builtin></rtps></participant>
-</profiles></dds>
-"""
 _DOMAINS = 100  # ports of higher domains may be given to any program by the system
 
 
@@ -56,15 +43,10 @@ def free_domain_id() -> int:
     raise ConfigurationError(f"none of the ROS domains 1 to {_DOMAINS} is free on this computer")
 
 
-def isolate(domain_id: int, profile: Path) -> None:
+def isolate(domain_id: int) -> None:
     """Keep this process and its children to one domain on this computer; before rclpy.init."""
-    profile.parent.mkdir(parents=True, exist_ok=True)
-    profile.write_text(_QUICK_DISCOVERY, "utf-8")
-    os.environ.update(
-        ROS_DOMAIN_ID=str(domain_id),
-        ROS_AUTOMATIC_DISCOVERY_RANGE="LOCALHOST",
-        FASTRTPS_DEFAULT_PROFILES_FILE=str(profile.resolve()),
-    )
+    os.environ["ROS_DOMAIN_ID"] = str(domain_id)
+    os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 
 
 @dataclass(frozen=True)
@@ -132,14 +114,19 @@ class NodeProcess:
             lines = self.output().strip().splitlines() or ["without a word"]
             raise NodeDiedError(f"{self.name} ended with code {self.exit_code}: {lines[-1]}")
 
+    def interrupt(self) -> None:
+        """Ask the node to end, as Ctrl-C does."""
+        if self._process.poll() is None:
+            os.killpg(self._process.pid, signal.SIGINT)
+
     def stop(self, patience_s: float = 5.0) -> int:
-        """Interrupt the node, ever less politely, and return its exit code."""
-        for request in (signal.SIGINT, signal.SIGTERM, signal.SIGKILL):
-            if self._process.poll() is not None:
-                break
-            os.killpg(self._process.pid, request)
-            try:
-                self._process.wait(patience_s)
-            except subprocess.TimeoutExpired:
-                continue
+        """Wait for the node to end, ask ever less politely, and return its exit code."""
+        for request in (signal.SIGTERM, signal.SIGKILL):
+            if not self._ends_within(patience_s):
+                os.killpg(self._process.pid, request)
         return self._process.wait()
+
+    def _ends_within(self, timeout_s: float) -> bool:
+        with suppress(subprocess.TimeoutExpired):
+            self._process.wait(timeout_s)
+        return self._process.poll() is not None

@@ -34,7 +34,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
 from risk_dqn_planner.errors import BagError
-from sim_bridge.ros.pacing import SECOND_NS
+from risk_dqn_planner.ros.conversions import SECOND_NS
 from sim_bridge.ros.topics import Topic
 
 _INFINITE = QosTime(2147483647, 4294967295)

@@ -5,14 +5,13 @@ import time
 import pytest
 from intersection_msgs.msg import Decision, Situation
 
+from risk_dqn_planner.ros.conversions import SECOND_NS, to_ns, to_stamp
 from sim_bridge.ros.pacing import (
-    SECOND_NS,
+    DECISION_PERIOD_NS,
     LockStep,
     Mailbox,
     RealTime,
     WallPace,
-    to_ns,
-    to_stamp,
 )
 
 LONG_S = 30.0  # a test that waits this long has failed
@@ -84,26 +83,39 @@ def test_in_lock_step_the_clock_waits_for_the_situation() -> None:
 def test_in_lock_step_a_planner_that_stays_silent_is_waited_for_only_so_long() -> None:
     link = FakeLink()
     pacing = LockStep(link, WallPace(0.0), 0.05)
-    pacing.reach(100)
-    assert link.log == ["clock 100 with situation -1"]
-    assert pacing.decision(100) is None
+    pacing.reach(DECISION_PERIOD_NS)
+    assert link.log == [f"clock {DECISION_PERIOD_NS} with situation -1"]
+    assert pacing.decision(DECISION_PERIOD_NS) is None
 
 
 def test_in_lock_step_only_a_decision_on_the_present_situation_counts() -> None:
     link = FakeLink()
     pacing = LockStep(link, WallPace(0.0), 0.5)
-    link.answers = {100: [decision(100, 100)], 200: [decision(200, 150)]}
-    link.tick(100)
-    assert pacing.decision(100) == decision(100, 100)
-    link.tick(200)
-    assert pacing.decision(200) is None
+    first, second = DECISION_PERIOD_NS, 2 * DECISION_PERIOD_NS
+    link.answers = {first: [decision(first, first)], second: [decision(second, second - 1)]}
+    link.tick(first)
+    assert pacing.decision(first) == decision(first, first)
+    link.tick(second)
+    assert pacing.decision(second) is None
+
+
+def test_in_lock_step_a_decision_holds_until_the_next_is_due() -> None:
+    link = FakeLink()
+    pacing = LockStep(link, WallPace(0.0), 0.05)
+    start = DECISION_PERIOD_NS
+    link.answers = {start: [decision(start, start)]}
+    link.tick(start)
+    assert pacing.decision(start) == decision(start, start)
+    assert pacing.decision(start + 100_000_000) == decision(start, start)
+    assert pacing.decision(start + DECISION_PERIOD_NS) is None
 
 
 def test_in_lock_step_a_lost_clock_message_is_sent_again() -> None:
     link = FakeLink()
-    link.answers = {100: [decision(100, 100)]}
+    link.answers = {DECISION_PERIOD_NS: [decision(DECISION_PERIOD_NS, DECISION_PERIOD_NS)]}
     # `reach` has ticked, but nobody heard it.
-    assert LockStep(link, WallPace(0.0), LONG_S).decision(100) == decision(100, 100)
+    found = LockStep(link, WallPace(0.0), LONG_S).decision(DECISION_PERIOD_NS)
+    assert found == decision(DECISION_PERIOD_NS, DECISION_PERIOD_NS)
 
 
 def test_in_real_time_the_newest_decision_counts_until_it_is_a_second_old() -> None:

@@ -9,8 +9,8 @@ from mcap_ros2.decoder import DecoderFactory
 from rclpy.serialization import serialize_message
 
 from risk_dqn_planner.errors import BagError
+from risk_dqn_planner.ros.conversions import to_stamp
 from sim_bridge.ros import topics
-from sim_bridge.ros.pacing import to_stamp
 from sim_bridge.ros.recording import BagWriter, Stored, read_bag, stamp_of
 
 TOPICS = (topics.OBJECTS, topics.DECISION)

@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Plays one episode: publish a frame, let time reach it, obey the decision, step on."""
+
+from collections.abc import Callable
+
+from risk_dqn_planner.decision import Action
+from risk_dqn_planner.ros.conversions import SECOND_NS
+from sim_bridge.ros.frames import FramePublisher
+from sim_bridge.ros.pacing import DECISION_PERIOD_NS, EPISODE_GAP_NS, Pacing, pass_time
+from sim_bridge.simulation import Simulation
+
+
+class EpisodePlayer:
+    """Plays episodes one after the other on a clock that never goes back."""
+
+    def __init__(
+        self, publisher: FramePublisher, pacing: Pacing, start_ns: int, go_on: Callable[[], bool]
+    ) -> None:
+        """Episodes begin at `start_ns`; they are abandoned once `go_on` says no."""
+        self._publisher = publisher
+        self._pacing = pacing
+        self._now_ns = start_ns - EPISODE_GAP_NS
+        self._go_on = go_on
+
+    def play(self, simulation: Simulation, seed: int) -> None:
+        """Play the episode of a seed until it ends, after a pause that ends the one before."""
+        start_ns = self._now_ns + EPISODE_GAP_NS
+        start_ns = -(-start_ns // DECISION_PERIOD_NS) * DECISION_PERIOD_NS
+        pass_time(self._pacing, self._now_ns, start_ns)
+        simulation.reset([seed])
+        self._now_ns = start_ns
+        self._publisher.publish_start(simulation, seed, start_ns)
+        late = self._run(simulation, seed)
+        if late is not None:
+            self._publisher.publish_end(simulation, seed, self._now_ns, late)
+
+    def _run(self, simulation: Simulation, seed: int) -> int | None:
+        """Return the number of late decisions, None if the episode was abandoned."""
+        step_ns = round(simulation.scenario.timing.inner_step_s * SECOND_NS)
+        late = 0
+        while self._go_on():
+            self._publisher.publish_frame(simulation, seed, self._now_ns)
+            self._pacing.reach(self._now_ns)
+            decision = self._pacing.decision(self._now_ns)
+            if not simulation.state.running[0]:
+                return late
+            if decision is None and self._now_ns % DECISION_PERIOD_NS == 0:
+                late += 1
+            action = Action.STOP if decision is None else decision.action
+            simulation.inner_step([action])
+            self._now_ns += step_ns
+        return None

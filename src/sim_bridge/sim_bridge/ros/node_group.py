@@ -1,0 +1,47 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Node processes that start and end together."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from types import TracebackType
+
+from sim_bridge.ros.process import NodeCommand, NodeProcess
+
+
+class NodeGroup:
+    """Processes of nodes, all or none; a context manager."""
+
+    def __init__(self, commands: Sequence[NodeCommand], log_folder: Path) -> None:
+        self._commands = commands
+        self._log_folder = log_folder
+        self._processes: list[NodeProcess] = []
+
+    def __enter__(self) -> "NodeGroup":
+        try:
+            for command in self._commands:
+                log = self._log_folder / f"{command.executable}.log"
+                self._processes.append(NodeProcess(command, log))
+        except BaseException:
+            self.stop()
+            raise
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.stop()
+
+    def check(self) -> None:
+        """Raise NodeDiedError if one of the nodes has ended."""
+        for process in self._processes:
+            process.check()
+
+    def stop(self) -> None:
+        """End all nodes: ask everyone first, then wait."""
+        for process in self._processes:
+            process.interrupt()
+        for process in self._processes:
+            process.stop()

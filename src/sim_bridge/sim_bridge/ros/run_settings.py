@@ -1,0 +1,160 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a run needs to know, from the command line or from the notes in a bag, and as parameters."""
+
+import argparse
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from risk_dqn_planner.errors import BagError, ConfigurationError, PlannerError
+from risk_dqn_planner.map.loader import MapOrigin
+from sim_bridge.maps import map_names, shipped_map
+from sim_bridge.ros.process import NodeCommand, ParameterValue
+from sim_bridge.ros.topics import remappings
+
+DEFAULT_MAP = "four_way"
+DEFAULT_PROJECTOR = "utm"
+DEFAULT_POLICY = "rule_based"
+DEFAULT_SCENARIO = "demo_light"
+
+
+@dataclass(frozen=True)
+class RunSettings:
+    """What is driven where, by which policy.
+
+    map_name: name of an own map or path of another. overrides: parameters of the planner's
+    nodes that differ from their defaults.
+    """
+
+    map_name: str
+    map_file: Path
+    route: tuple[int, ...]
+    origin: MapOrigin
+    projector: str
+    policy: str
+    scenario: str
+    overrides: Mapping[str, ParameterValue] = field(default_factory=dict)
+
+    def notes(self) -> dict[str, str]:
+        """Texts from which `from_notes` builds the same settings."""
+        return {
+            "map": self.map_name,
+            "route": ",".join(str(lanelet_id) for lanelet_id in self.route),
+            "origin": f"{self.origin.latitude_deg!r},{self.origin.longitude_deg!r}",
+            "projector": self.projector,
+            "policy": self.policy,
+            "scenario": self.scenario,
+        }
+
+    def _map_parameters(self) -> dict[str, ParameterValue]:
+        return {
+            "use_sim_time": True,
+            "map_file": str(self.map_file.resolve()),
+            "map_origin_latitude": self.origin.latitude_deg,
+            "map_origin_longitude": self.origin.longitude_deg,
+            "map_projector": self.projector,
+        }
+
+    def planner_commands(self) -> list[NodeCommand]:
+        """Situation and policy node, in simulated time."""
+        situation = {**self._map_parameters(), **self.overrides}
+        policy = {"use_sim_time": True, "policy": self.policy, **self.overrides}
+        package = "risk_dqn_planner"
+        return [
+            NodeCommand(package, "situation_node", situation, remappings("situation")),
+            NodeCommand(package, "policy_node", policy, remappings("policy")),
+        ]
+
+    def simulator_command(self, real_time_factor: float) -> NodeCommand:
+        """Simulator in lock-step, waiting for the reset service."""
+        parameters = {
+            **self._map_parameters(),
+            "use_sim_time": False,  # it is the clock
+            "route": list(self.route),
+            "scenario": self.scenario,
+            "real_time_factor": real_time_factor,
+            "lockstep": True,
+            "autostart": False,
+        }
+        return NodeCommand("sim_bridge", "simulator_node", parameters, remappings("simulator"))
+
+
+def parse_route(text: str) -> tuple[int, ...]:
+    """Read lanelet ids separated by commas.
+
+    Raises:
+        ConfigurationError: something else is among them.
+    """
+    try:
+        return tuple(int(part) for part in text.split(","))
+    except ValueError as error:
+        raise ConfigurationError(
+            f"route is {text!r}, expected lanelet ids separated by commas such as 1,9,4"
+        ) from error
+
+
+def add_run_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options that say what is driven where."""
+    names = ", ".join(map_names())
+    parser.add_argument(
+        "--map", default=DEFAULT_MAP, help=f"own map ({names}) or an .osm file [%(default)s]"
+    )
+    parser.add_argument("--route", help="lanelet ids, separated by commas; own maps have one")
+    parser.add_argument("--origin", help="latitude,longitude of the map's projection [deg]")
+    parser.add_argument(
+        "--projector",
+        default=DEFAULT_PROJECTOR,
+        help="utm, local_cartesian, mercator or local_xy [%(default)s]",
+    )
+    parser.add_argument(
+        "--policy", default=DEFAULT_POLICY, help="name or policy file [%(default)s]"
+    )
+    parser.add_argument("--scenario", default=DEFAULT_SCENARIO, help="name [%(default)s]")
+
+
+def run_settings(arguments: argparse.Namespace) -> RunSettings:
+    """Complete the options: an own map brings its file, route and origin.
+
+    Raises:
+        ConfigurationError: a file without route. MapFileError: no such own map. Both name it.
+    """
+    name = str(arguments.map)
+    route = parse_route(arguments.route) if arguments.route else None
+    origin = MapOrigin.from_text(arguments.origin) if arguments.origin else None
+    if name.endswith(".osm"):
+        path = Path(name)
+        if route is None:
+            raise ConfigurationError(f"{name} is no own map, so its route must be given")
+        if origin is None:
+            raise ConfigurationError(f"{name} is no own map, so its origin must be given")
+    else:
+        own = shipped_map(name)
+        path, route, origin = own.path, route or own.route, origin or own.origin
+    return RunSettings(
+        map_name=name,
+        map_file=path,
+        route=route,
+        origin=origin,
+        projector=arguments.projector,
+        policy=arguments.policy,
+        scenario=arguments.scenario,
+    )
+
+
+def from_notes(
+    path: Path, notes: Mapping[str, str], overrides: Mapping[str, ParameterValue]
+) -> RunSettings:
+    """Read the settings with which a bag was recorded.
+
+    Raises:
+        BagError: the notes are incomplete or make no sense.
+    """
+    expected = ("map", "route", "origin", "projector", "policy", "scenario")
+    missing = [name for name in expected if name not in notes]
+    if missing:
+        raise BagError(f"{path} does not say with which {missing[0]} it was recorded")
+    try:
+        settings = run_settings(argparse.Namespace(**{name: notes[name] for name in expected}))
+    except PlannerError as error:
+        raise BagError(f"{path} cannot be replayed: {error}") from error
+    return replace(settings, overrides=overrides)

@@ -38,6 +38,14 @@ class ObjectArrays(NamedTuple):
     width_m: Floats
 
 
+class Perception(NamedTuple):
+    """What is perceived at one time; visible_area is a simple polygon (K, 2) [m]."""
+
+    ego: EgoPose
+    objects: ObjectArrays
+    visible_area: Floats
+
+
 def object_arrays(
     rows: ArrayLike = (), ids: ArrayLike | None = None, size_m: tuple[float, float] = (0.0, 0.0)
 ) -> ObjectArrays:

@@ -2,25 +2,28 @@
 """How far lane 1 (north through the origin, zone from y = -3 to 3) is seen without a gap."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import ArrayLike
 
 from risk_dqn_planner.geometry.polyline import Polyline
 from risk_dqn_planner.intersection.model import ConflictPath, IntersectionModel, LanePath
 from risk_dqn_planner.situation.occlusion import hidden_distances_kernel, inside_kernel
 from risk_dqn_planner.situation.paths import path_table
+from risk_dqn_planner.situation.situations import Floats
 from risk_dqn_planner.situation.warm_up import crossing_model, square
 
 RANGE = 70.0
 
 
 def hidden(
-    polygon: ArrayLike, model: IntersectionModel | None = None, sensor_range: float = RANGE
+    polygon: Sequence[Sequence[float]] | Floats,
+    model: IntersectionModel | None = None,
+    sensor_range: float = RANGE,
 ) -> float:
     chosen = crossing_model() if model is None else model
     area = np.asarray(polygon, dtype=np.float64)
@@ -75,7 +78,15 @@ def test_a_corner_that_only_touches_the_lane_hides_nothing() -> None:
 
 
 def test_a_corner_that_reaches_across_the_lane_hides() -> None:
-    across = [[-50, -50], [50, -50], [50, -20], [-0.1, -15], [50, -10], [50, 20], [-50, 20]]
+    across: list[list[float]] = [
+        [-50, -50],
+        [50, -50],
+        [50, -20],
+        [-0.1, -15],
+        [50, -10],
+        [50, 20],
+        [-50, 20],
+    ]
     assert hidden(across) == pytest.approx(15.0, abs=0.02)
 
 
@@ -86,7 +97,7 @@ def test_an_edge_that_meets_the_lane_at_one_of_its_own_points_is_met() -> None:
 
 def test_an_edge_through_the_start_of_the_search_is_met() -> None:
     # The polygon's upper edge lies exactly on the zone's exit: the zone itself is seen.
-    assert hidden([[-50, -25], [50, -25], [50, 3.0], [-50, 3.0]]) == pytest.approx(25.0)
+    assert hidden([[-50, -25], [50, -25], [50, 3], [-50, 3]]) == pytest.approx(25.0)
 
 
 def test_an_edge_along_the_lane_is_no_end() -> None:

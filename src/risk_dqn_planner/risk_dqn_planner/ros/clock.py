@@ -1,0 +1,36 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Simulated and real time: what jumps, what stands still, and timers for either."""
+
+from collections.abc import Callable
+
+from rclpy.clock import Clock, JumpHandle, JumpThreshold, TimeJump
+from rclpy.clock_type import ClockType
+from rclpy.duration import Duration
+from rclpy.node import Node
+from rclpy.timer import Timer
+
+
+def now_ns(node: Node) -> int:
+    """Return the time of the node's clock, the one that stamps are compared with [ns]."""
+    return int(node.get_clock().now().nanoseconds)
+
+
+def on_clock_back(node: Node, react: Callable[[], None]) -> JumpHandle:
+    """Call `react` whenever the node's clock has jumped back, as it does when a bag restarts.
+
+    The handle must be kept for as long as that is wanted.
+    """
+
+    def jumped(jump: TimeJump) -> None:
+        if jump.delta.nanoseconds < 0:
+            react()
+
+    threshold = JumpThreshold(
+        min_forward=None, min_backward=Duration(nanoseconds=-1), on_clock_change=False
+    )
+    return node.get_clock().create_jump_callback(threshold, post_callback=jumped)
+
+
+def steady_timer(node: Node, period_s: float, react: Callable[[], None]) -> Timer:
+    """Return a timer that also runs while simulated time stands still."""
+    return node.create_timer(period_s, react, clock=Clock(clock_type=ClockType.STEADY_TIME))

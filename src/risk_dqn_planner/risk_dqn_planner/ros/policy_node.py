@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Publishes a decision twice a second, whatever the inputs do."""
+
+import numpy as np
+from intersection_msgs.msg import Decision, Situation
+from rclpy.node import Node
+from visualization_msgs.msg import MarkerArray
+
+from risk_dqn_planner.decision import Reason, explain
+from risk_dqn_planner.errors import InputError, PolicyError
+from risk_dqn_planner.policies.base import Policy
+from risk_dqn_planner.policies.loading import load_policy
+from risk_dqn_planner.ros import conversions, markers
+from risk_dqn_planner.ros.clock import now_ns, on_clock_back, steady_timer
+from risk_dqn_planner.ros.decider import Choice, Decider, DeciderConfig, UnusablePolicy
+from risk_dqn_planner.ros.diagnostics import ERROR, OK, Diagnostics
+from risk_dqn_planner.ros.main import run
+from risk_dqn_planner.ros.parameters import PolicyParameters, declare
+from risk_dqn_planner.ros.qos import NEWEST
+from risk_dqn_planner.situation.report import SituationReport, Status
+from risk_dqn_planner.situation.warm_up import example_situation
+
+DIAGNOSTICS_PERIOD_S = 1.0
+
+
+class PolicyNode(Node):
+    """Asks a policy about the newest situation; what is doubtful is answered with Stop."""
+
+    def __init__(self) -> None:
+        super().__init__("policy")
+        self._settings = declare(self, PolicyParameters)
+        config = declare(self, DeciderConfig)
+        self._policy = self._load()
+        self._decider = Decider(self._policy, explain, config)
+        self._reason: Reason | None = None
+        self._publisher = self.create_publisher(Decision, "~/output/decision", NEWEST)
+        self._marker_publisher = self.create_publisher(MarkerArray, "~/debug/markers", NEWEST)
+        self._diagnostics = Diagnostics(self, "planner")
+        self._clock_back = on_clock_back(self, self._decider.forget)
+        self.create_subscription(Situation, "~/input/situation", self._on_situation, NEWEST)
+        # On the node's clock: with simulated time, decisions fall on multiples of the period.
+        self.create_timer(1.0 / self._settings.rate_hz, self._decide)
+        steady_timer(self, DIAGNOSTICS_PERIOD_S, self._diagnostics.publish)
+        self.get_logger().info(f"ready with policy {self._policy.name}")
+
+    def _load(self) -> Policy | UnusablePolicy:
+        """Load the policy and let it decide once, so that the first real decision is not late.
+
+        A vehicle whose policy is broken must hear Stop, not silence.
+        """
+        name = self._settings.policy
+        try:
+            policy = load_policy(name)
+            for restart in (True, False):
+                situations = example_situation()
+                explain(policy.decide(situations, np.array([restart])), situations, 0, policy)
+        except PolicyError as error:
+            self.get_logger().error(f"{error}; every decision will be Stop")
+            return UnusablePolicy(name, str(error))
+        return policy
+
+    def _on_situation(self, message: Situation) -> None:
+        try:
+            report = conversions.situation_from_message(message)
+        except InputError as error:
+            stamp_ns = conversions.to_ns(message.header.stamp)
+            report = SituationReport(stamp_ns, Status.INVALID_INPUT, str(error))
+        self._decider.receive(report)
+
+    def _decide(self) -> None:
+        stamp_ns = now_ns(self)
+        choice = self._decider.decide(stamp_ns)
+        message = conversions.decision_to_message(
+            choice.decision, stamp_ns, choice.situation_stamp_ns
+        )
+        self._publisher.publish(message)
+        self._tell(choice)
+        if self._marker_publisher.get_subscription_count() > 0:
+            frame_id = self._settings.marker_frame
+            self._marker_publisher.publish(
+                markers.decision_markers(choice.decision, stamp_ns, frame_id)
+            )
+
+    def _tell(self, choice: Choice) -> None:
+        """Log when decisions begin or cease to be the policy's own, and keep diagnostics."""
+        decision = choice.decision
+        faulty = decision.reason >= Reason.NO_SITUATION
+        was_faulty = self._reason is None or self._reason >= Reason.NO_SITUATION
+        if faulty and decision.reason is not self._reason:
+            self.get_logger().warning(decision.text)
+        elif was_faulty and not faulty:
+            self.get_logger().info("deciding")
+        self._reason = decision.reason
+        values = {
+            "action": decision.action.name,
+            "reason": decision.reason.name,
+            "policy": decision.policy_name,
+            "policy_hash": decision.policy_hash,
+        }
+        self._diagnostics.set("decision", ERROR if faulty else OK, decision.text, values)
+
+
+def main() -> int:
+    """Run the node; the exit code."""
+    return run("policy", PolicyNode)

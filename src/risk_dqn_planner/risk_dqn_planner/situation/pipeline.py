@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: Apache-2.0
+"""From a route and what is perceived to a report; every fault of the input becomes a status."""
+
+from collections.abc import Callable
+
+from risk_dqn_planner.errors import PlannerError
+from risk_dqn_planner.intersection.model import IntersectionModel
+from risk_dqn_planner.situation.builder import SituationBuilder
+from risk_dqn_planner.situation.config import SituationConfig
+from risk_dqn_planner.situation.inputs import Perception
+from risk_dqn_planner.situation.report import SituationReport, Status, fault_status
+
+Route = tuple[int, ...]
+
+# Models are small; this many routes are remembered so that a loop of errands builds each once.
+_REMEMBERED_ROUTES = 16
+
+
+class SituationPipeline:
+    """Builds the model of a route when it is first asked for, and situations on it."""
+
+    def __init__(
+        self,
+        build_model: Callable[[Route], IntersectionModel],
+        config: SituationConfig | None = None,
+    ) -> None:
+        self._build_model = build_model
+        self._config = config or SituationConfig()
+        self._builders: dict[Route, SituationBuilder] = {}
+        self._builder: SituationBuilder | None = None
+        self.route: Route = ()
+        self.route_fault = ""
+
+    @property
+    def model(self) -> IntersectionModel | None:
+        """The selected route's model; None without a usable route."""
+        return None if self._builder is None else self._builder.model
+
+    def select(self, route: Route) -> None:
+        """Take a route from now on; one that does not fit the map is reported, not raised."""
+        self.route, self.route_fault, self._builder = route, "", None
+        try:
+            self._builder = self._builder_of(route)
+        except PlannerError as error:
+            self.route_fault = str(error)
+
+    def _builder_of(self, route: Route) -> SituationBuilder:
+        if route not in self._builders:
+            builder = SituationBuilder(self._build_model(route), self._config)
+            while len(self._builders) >= _REMEMBERED_ROUTES:
+                del self._builders[next(iter(self._builders))]
+            self._builders[route] = builder
+        return self._builders[route]
+
+    def report(self, stamp_ns: int, seen: Perception) -> SituationReport:
+        """Return the situation at the objects' time, or the input's fault."""
+        if self._builder is None:
+            return self.route_report(stamp_ns)
+        try:
+            situations = self._builder.build(*seen)
+        except PlannerError as error:
+            return self.fault(stamp_ns, fault_status(error), str(error))
+        return SituationReport(
+            stamp_ns=stamp_ns,
+            status=Status.OK,
+            text="",
+            route=self.route,
+            stop_line_derived=self._builder.model.stop_line.derived,
+            situations=situations,
+        )
+
+    def route_report(self, stamp_ns: int) -> SituationReport:
+        """Return the report for as long as there is no usable route."""
+        if self.route_fault:
+            return self.fault(stamp_ns, Status.BAD_ROUTE, self.route_fault)
+        return self.fault(stamp_ns, Status.MISSING_INPUT, "no route received yet")
+
+    def fault(self, stamp_ns: int, status: Status, text: str) -> SituationReport:
+        """Return a report without a situation."""
+        return SituationReport(stamp_ns=stamp_ns, status=status, text=text, route=self.route)

@@ -1,0 +1,216 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What goes through a message comes out the same; what is broken is refused by name."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from intersection_msgs.msg import Decision as DecisionMessage
+from intersection_msgs.msg import PerceivedObjects, RelevantVehicle
+from intersection_msgs.msg import Situation as SituationMessage
+from nav_msgs.msg import Odometry
+from rclpy.serialization import deserialize_message, serialize_message
+
+from risk_dqn_planner.decision import Action, Decision, Reason
+from risk_dqn_planner.errors import InputError
+from risk_dqn_planner.ros import conversions
+from risk_dqn_planner.situation.inputs import EgoPose, object_arrays
+from risk_dqn_planner.situation.report import SituationReport, Status
+from risk_dqn_planner.situation.warm_up import example_situation, square
+
+STAMP_NS = 1_234_567_890_123
+REPORT = SituationReport(
+    stamp_ns=STAMP_NS,
+    status=Status.OK,
+    text="",
+    route=(3476, -2),
+    stop_line_derived=True,
+    situations=example_situation(),
+)
+DECISION = Decision(
+    action=Action.SLOW,
+    target_speed_mps=1.0,
+    reason=Reason.VEHICLE,
+    text="SLOW: vehicle 17 reaches lane 3 in 2.1 s",
+    q_values=np.array([0.5, -0.25, math.nan]),
+    action_risks=np.array([0.0, 0.5, 1.0]),
+    critical_vehicle_id=17,
+    critical_lane_id=None,
+    policy_name="rule_based",
+    policy_hash="f" * 64,
+)
+
+
+@given(st.integers(0, 2**31 * 10**9 - 1))
+def test_stamps_keep_every_nanosecond(time_ns: int) -> None:
+    assert conversions.to_ns(conversions.to_stamp(time_ns)) == time_ns
+
+
+@pytest.mark.parametrize(("seconds", "parts"), [(1.25, (1, 250_000_000)), (0.3, (0, 300_000_000))])
+def test_durations_are_split_into_seconds_and_nanoseconds(
+    seconds: float, parts: tuple[int, int]
+) -> None:
+    duration = conversions.to_duration(seconds)
+    assert (duration.sec, duration.nanosec) == parts
+
+
+@given(
+    st.floats(-1e4, 1e4),
+    st.floats(-1e4, 1e4),
+    st.floats(-math.pi + 1e-6, math.pi - 1e-6),
+    st.floats(-5.0, 30.0),
+)
+def test_the_ego_survives_the_way_through_odometry(
+    x: float, y: float, heading: float, speed: float
+) -> None:
+    ego = EgoPose(x, y, heading, speed)
+    message = conversions.ego_to_message(ego, STAMP_NS)
+    assert conversions.ego_from_message(message) == pytest.approx(ego)
+
+
+def test_odometry_is_in_the_map_and_its_twist_in_the_vehicles_frame() -> None:
+    message = conversions.ego_to_message(EgoPose(1.0, 2.0, math.pi / 2, 3.0), STAMP_NS)
+    assert (message.header.frame_id, message.child_frame_id) == ("map", "base_link")
+    # Facing north at 3 m/s: all of the speed is forward, whatever the heading.
+    assert (message.twist.twist.linear.x, message.twist.twist.linear.y) == (3.0, 0.0)
+    assert conversions.to_ns(message.header.stamp) == STAMP_NS
+
+
+def test_the_footprints_centre_may_lie_ahead_of_the_odometrys_frame() -> None:
+    message = conversions.ego_to_message(EgoPose(10.0, 5.0, math.pi / 2, 3.0), STAMP_NS)
+    assert conversions.ego_from_message(message, 1.4) == pytest.approx((10.0, 6.4, math.pi / 2, 3))
+
+
+def test_an_orientation_that_was_never_set_is_refused() -> None:
+    message = Odometry()
+    message.pose.pose.orientation.w = 0.0
+    with pytest.raises(InputError, match="odometry: orientation has norm 0, expected 1"):
+        conversions.ego_from_message(message)
+
+
+def test_objects_survive_the_way_over_the_wire() -> None:
+    objects = object_arrays([[1.0, 2.0, 0.5, 3.0], [4.0, 5.0, -0.5, 6.0]], [7, -9], (4.5, 1.8))
+    message = conversions.objects_to_message(objects, STAMP_NS)
+    received = deserialize_message(serialize_message(message), PerceivedObjects)
+    assert received.header.frame_id == "map"
+    for before, after in zip(objects, conversions.objects_from_message(received), strict=True):
+        assert after.dtype == before.dtype
+        assert after.tolist() == before.tolist()
+
+
+def test_an_empty_list_of_objects_is_a_list() -> None:
+    objects = conversions.objects_from_message(PerceivedObjects())
+    assert [len(column) for column in objects] == [0] * 7
+
+
+def test_a_polygon_keeps_its_corners_to_a_millimetre() -> None:
+    area = conversions.area_to_message(square(123.4567), STAMP_NS)
+    corners = conversions.polygon_from_message(area.polygon)
+    assert corners == pytest.approx(square(123.4567), abs=1e-3)
+
+
+def test_a_message_in_another_frame_is_refused() -> None:
+    odometry = conversions.ego_to_message(EgoPose(0.0, 0.0, 0.0, 0.0), STAMP_NS)
+    area = conversions.area_to_message(square(5.0), STAMP_NS)
+    objects = conversions.objects_to_message(object_arrays(), STAMP_NS, frame_id="base_link")
+    with pytest.raises(InputError, match="objects: frame is 'base_link', expected 'map'"):
+        conversions.perception_from_messages(odometry, area, objects, "map", 0.0)
+
+
+def test_a_route_survives() -> None:
+    message = conversions.route_to_message((3476, 16497, -5), STAMP_NS)
+    assert conversions.route_from_message(message) == (3476, 16497, -5)
+
+
+def over_the_wire(report: SituationReport) -> SituationReport:
+    message = conversions.situation_to_message(report)
+    received = deserialize_message(serialize_message(message), SituationMessage)
+    return conversions.situation_from_message(received)
+
+
+def test_a_situation_survives_the_way_over_the_wire() -> None:
+    received = over_the_wire(REPORT)
+    assert replace(received, situations=None) == replace(REPORT, situations=None)
+    assert received.situations is not None
+    assert REPORT.situations is not None
+    pairs = zip(REPORT.situations, received.situations, strict=True)
+    for name, (before, after) in zip(REPORT.situations._fields, pairs, strict=True):
+        assert after.dtype == before.dtype, name
+        assert after.tolist() == before.tolist(), name
+
+
+def test_a_situation_names_lanes_and_vehicles_by_id() -> None:
+    message = conversions.situation_to_message(REPORT)
+    assert [lane.lane_id for lane in message.lanes] == [1]
+    assert [(v.vehicle_id, v.lane_id, v.distance_m) for v in message.vehicles] == [(1, 1, 30.0)]
+
+
+def test_a_fault_survives_without_a_situation() -> None:
+    fault = SituationReport(STAMP_NS, Status.OFF_ROUTE, "the ego is 3.0 m beside its route", (4,))
+    message = conversions.situation_to_message(fault)
+    assert over_the_wire(fault) == fault
+    assert (len(message.lanes), len(message.vehicles)) == (0, 0)
+
+
+def test_every_status_has_the_code_of_the_message() -> None:
+    for status in Status:
+        assert getattr(SituationMessage, status.name) == status
+
+
+def test_actions_and_reasons_have_the_codes_of_the_message() -> None:
+    for name in (*Action, *Reason):
+        assert getattr(DecisionMessage, name.name) == name
+
+
+def test_a_situation_with_a_number_that_is_not_finite_is_refused() -> None:
+    message = conversions.situation_to_message(REPORT)
+    message.lanes[0].hidden_distance_m = math.nan
+    with pytest.raises(InputError, match="lane_hidden_distance_m is not finite"):
+        conversions.situation_from_message(message)
+
+
+def test_a_vehicle_on_a_lane_that_is_not_listed_is_refused() -> None:
+    message = conversions.situation_to_message(REPORT)
+    message.vehicles.append(RelevantVehicle(vehicle_id=5, lane_id=99))
+    with pytest.raises(InputError, match="vehicle 5 is on lane 99, expected one of \\[1\\]"):
+        conversions.situation_from_message(message)
+
+
+def test_a_lane_that_appears_twice_is_refused() -> None:
+    message = conversions.situation_to_message(REPORT)
+    message.lanes = [message.lanes[0], message.lanes[0]]
+    with pytest.raises(InputError, match="a lane appears twice"):
+        conversions.situation_from_message(message)
+
+
+def test_an_unknown_status_is_refused() -> None:
+    with pytest.raises(InputError, match="unknown status 77"):
+        conversions.situation_from_message(SituationMessage(status=77))
+
+
+def test_a_decision_survives_the_way_over_the_wire() -> None:
+    message = conversions.decision_to_message(DECISION, STAMP_NS, STAMP_NS - 250_000_000)
+    received = deserialize_message(serialize_message(message), DecisionMessage)
+    decision = conversions.decision_from_message(received)
+    for name in ("q_values", "action_risks"):
+        np.testing.assert_array_equal(getattr(decision, name), getattr(DECISION, name))
+    assert replace(decision, q_values=DECISION.q_values, action_risks=DECISION.action_risks) == (
+        DECISION
+    )
+    assert received.situation_age_s == pytest.approx(0.25)
+    assert conversions.to_ns(received.situation_stamp) == STAMP_NS - 250_000_000
+    assert received.critical_lane_id == DecisionMessage.NO_ID
+
+
+def test_a_decision_without_a_situation_has_a_negative_age() -> None:
+    message = conversions.decision_to_message(DECISION, STAMP_NS)
+    assert message.situation_age_s < 0.0
+    assert conversions.to_ns(message.situation_stamp) == 0
+
+
+def test_an_unknown_action_is_refused() -> None:
+    with pytest.raises(InputError, match="decision: 9 is not a valid Action"):
+        conversions.decision_from_message(DecisionMessage(action=9))

@@ -1,0 +1,190 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which messages make a frame, and when. Times in milliseconds; messages are their own names."""
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from risk_dqn_planner.ros.synchroniser import Fault, Frame, Input, Synchroniser, SynchroniserConfig
+from risk_dqn_planner.situation.report import Status
+
+MS = 1_000_000
+ODOMETRY, AREA, OBJECTS = Input.ODOMETRY, Input.VISIBLE_AREA, Input.OBJECTS
+
+
+def synchroniser() -> Synchroniser:
+    return Synchroniser(SynchroniserConfig(sync_timeout_s=0.05, max_input_age_s=0.5))
+
+
+def give(sync: Synchroniser, source: Input, stamp_ms: int, steady_ms: int = 0) -> None:
+    sync.receive(source, stamp_ms * MS, f"{source.value} {stamp_ms}", steady_ms * MS)
+
+
+def take(sync: Synchroniser, steady_ms: int = 0) -> Frame | Fault | None:
+    return sync.take(steady_ms * MS)
+
+
+def frame(stamp_ms: int, odometry_ms: int, area_ms: int) -> Frame:
+    return Frame(
+        stamp_ms * MS,
+        f"odometry {odometry_ms}",
+        f"visible area {area_ms}",
+        f"objects {stamp_ms}",
+    )
+
+
+def test_a_frame_is_due_as_soon_as_all_inputs_are_as_new_as_the_objects() -> None:
+    sync = synchroniser()
+    give(sync, OBJECTS, 100)
+    give(sync, ODOMETRY, 110)
+    assert take(sync) is None
+    give(sync, AREA, 100)
+    assert take(sync) == frame(100, 110, 100)
+
+
+def test_a_frame_comes_out_once() -> None:
+    sync = synchroniser()
+    for source in (ODOMETRY, AREA, OBJECTS):
+        give(sync, source, 100)
+    assert take(sync) == frame(100, 100, 100)
+    assert take(sync, steady_ms=1000) is None
+
+
+def test_without_new_objects_nothing_is_due() -> None:
+    sync = synchroniser()
+    give(sync, ODOMETRY, 100)
+    give(sync, AREA, 100)
+    assert take(sync, steady_ms=1000) is None
+
+
+def test_after_the_timeout_the_newest_there_is_serves() -> None:
+    sync = synchroniser()
+    give(sync, ODOMETRY, 60)
+    give(sync, AREA, 40)
+    give(sync, OBJECTS, 100, steady_ms=7000)
+    assert take(sync, steady_ms=7049) is None
+    assert take(sync, steady_ms=7050) == frame(100, 60, 40)
+
+
+def test_objects_that_keep_coming_do_not_put_the_deadline_off() -> None:
+    sync = synchroniser()
+    give(sync, ODOMETRY, 0)
+    give(sync, AREA, 0)
+    give(sync, OBJECTS, 100, steady_ms=100)
+    give(sync, OBJECTS, 140, steady_ms=140)
+    assert take(sync, steady_ms=149) is None
+    assert take(sync, steady_ms=150) == frame(140, 0, 0)
+
+
+def test_an_input_of_exactly_the_allowed_age_serves_and_an_older_one_is_a_fault() -> None:
+    sync = synchroniser()
+    give(sync, ODOMETRY, 1000)
+    give(sync, AREA, 500)
+    give(sync, OBJECTS, 1000)
+    assert take(sync, steady_ms=50) == frame(1000, 1000, 500)
+    give(sync, OBJECTS, 1010, steady_ms=60)
+    assert take(sync, steady_ms=110) == Fault(
+        1010 * MS, Status.STALE_INPUT, "visible area is 0.51 s old, expected at most 0.5 s"
+    )
+
+
+def test_what_never_came_is_named() -> None:
+    sync = synchroniser()
+    give(sync, OBJECTS, 100)
+    assert take(sync, steady_ms=50) == Fault(
+        100 * MS, Status.MISSING_INPUT, "no odometry and no visible area received yet"
+    )
+
+
+def test_stamps_that_fall_are_a_fault_once_and_then_the_new_time_counts() -> None:
+    sync = synchroniser()
+    for source in (ODOMETRY, AREA, OBJECTS):
+        give(sync, source, 1000)
+    take(sync)
+    give(sync, OBJECTS, 900)
+    assert take(sync) == Fault(
+        900 * MS,
+        Status.INVALID_INPUT,
+        "objects went back in time by 0.100 s, expected rising stamps",
+    )
+    give(sync, OBJECTS, 950)
+    assert take(sync) == frame(950, 1000, 1000)
+
+
+def test_a_late_odometry_is_a_fault_even_though_the_objects_are_in_order() -> None:
+    sync = synchroniser()
+    give(sync, ODOMETRY, 1000)
+    give(sync, ODOMETRY, 990)
+    give(sync, AREA, 1000)
+    give(sync, OBJECTS, 1000)
+    fault = take(sync)
+    assert isinstance(fault, Fault)
+    assert fault.text.startswith("odometry went back in time")
+
+
+def test_a_repeated_stamp_is_in_order() -> None:
+    sync = synchroniser()
+    for _ in range(2):
+        for source in (ODOMETRY, AREA, OBJECTS):
+            give(sync, source, 100)
+        assert take(sync) == frame(100, 100, 100)
+
+
+def test_inputs_that_have_stopped_are_overdue_by_the_clock_of_the_stamps() -> None:
+    sync = synchroniser()
+    assert sync.overdue(0) == Fault(
+        0, Status.MISSING_INPUT, "no odometry and no visible area and no objects received yet"
+    )
+    for source in (ODOMETRY, AREA, OBJECTS):
+        give(sync, source, 1000)
+    assert sync.overdue(1500 * MS) is None
+    assert sync.overdue(1501 * MS) == Fault(
+        1501 * MS, Status.STALE_INPUT, "odometry is 0.50 s old, expected at most 0.5 s"
+    )
+
+
+def test_inputs_ahead_of_the_clock_are_not_overdue() -> None:
+    # In lock-step a frame is published before the clock reaches its time.
+    sync = synchroniser()
+    for source in (ODOMETRY, AREA, OBJECTS):
+        give(sync, source, 1000)
+    assert sync.overdue(0) is None
+    assert take(sync) == frame(1000, 1000, 1000)
+
+
+def test_when_the_clock_jumps_back_the_new_time_starts_without_a_fault() -> None:
+    sync = synchroniser()
+    for source in (ODOMETRY, AREA, OBJECTS):
+        give(sync, source, 60_000)
+    take(sync)
+    sync.clock_went_back(5000 * MS)
+    assert sync.age_s(OBJECTS, 5000 * MS) is None
+    for source in (ODOMETRY, AREA, OBJECTS):
+        give(sync, source, 5000)
+    assert take(sync) == frame(5000, 5000, 5000)
+
+
+def test_when_the_clock_jumps_back_after_the_new_messages_they_are_kept() -> None:
+    sync = synchroniser()
+    give(sync, OBJECTS, 60_000)
+    for source in (ODOMETRY, AREA, OBJECTS):
+        give(sync, source, 5000)
+    sync.clock_went_back(4900 * MS)
+    assert take(sync) == frame(5000, 5000, 5000)
+
+
+ARRIVALS = st.lists(st.tuples(st.sampled_from(Input), st.integers(0, 400)), max_size=40)
+
+
+@given(ARRIVALS)
+def test_a_frame_never_holds_an_input_older_than_allowed(arrivals: list[tuple[Input, int]]) -> None:
+    sync = synchroniser()
+    stamp = 0
+    for steady, (source, step) in enumerate(arrivals):
+        stamp += step
+        sync.receive(source, stamp * MS, stamp, steady * 100 * MS)
+        due = take(sync, steady_ms=(steady + 1) * 100)
+        if isinstance(due, Frame):
+            assert due.objects == due.stamp_ns // MS
+            for message in (due.odometry, due.visible_area):
+                assert isinstance(message, int)
+                assert message >= due.stamp_ns // MS - 500

@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Every fault of the input becomes a status with a sentence; nothing is raised."""
+
+import pytest
+
+from risk_dqn_planner.errors import (
+    DisconnectedRouteError,
+    EgoPoseError,
+    InputError,
+    MapError,
+    NoConflictError,
+    PlannerError,
+)
+from risk_dqn_planner.intersection.model import IntersectionModel
+from risk_dqn_planner.situation.inputs import EgoPose, Perception, object_arrays
+from risk_dqn_planner.situation.pipeline import SituationPipeline
+from risk_dqn_planner.situation.report import Status, fault_status
+from risk_dqn_planner.situation.warm_up import crossing_model, square
+
+ON_ROUTE = EgoPose(-20.0, 0.0, 0.0, 4.0)
+
+
+def perception(ego: EgoPose = ON_ROUTE, rows: tuple[tuple[float, ...], ...] = ()) -> Perception:
+    return Perception(ego, object_arrays(rows), square(50.0))
+
+
+class Maker:
+    """Builds the crossing for route (10,) and counts; refuses all others."""
+
+    def __init__(self) -> None:
+        self.built = 0
+
+    def __call__(self, route: tuple[int, ...]) -> IntersectionModel:
+        if route != (10,):
+            raise DisconnectedRouteError("lanelet 3 does not follow lanelet 2")
+        self.built += 1
+        return crossing_model()
+
+
+def test_without_a_route_one_is_missing() -> None:
+    report = SituationPipeline(Maker()).report(5, perception())
+    assert (report.stamp_ns, report.status) == (5, Status.MISSING_INPUT)
+    assert report.text == "no route received yet"
+    assert report.situations is None
+
+
+def test_a_route_that_does_not_fit_is_reported_until_a_good_one_comes() -> None:
+    pipeline = SituationPipeline(Maker())
+    pipeline.select((2, 3))
+    bad = pipeline.report(0, perception())
+    pipeline.select((10,))
+    good = pipeline.report(0, perception())
+    assert (bad.status, bad.route) == (Status.BAD_ROUTE, (2, 3))
+    assert bad.text == "lanelet 3 does not follow lanelet 2"
+    assert (good.status, good.text, good.route) == (Status.OK, "", (10,))
+    assert good.stop_line_derived
+    assert good.situations is not None
+
+
+def test_a_route_that_comes_back_is_not_built_again() -> None:
+    maker = Maker()
+    pipeline = SituationPipeline(maker)
+    for route in ((10,), (2, 3), (10,)):
+        pipeline.select(route)
+    assert maker.built == 1
+    assert pipeline.model is not None
+
+
+@pytest.mark.parametrize(
+    ("seen", "status", "words"),
+    [
+        (perception(EgoPose(-20.0, 9.0, 0.0, 4.0)), Status.OFF_ROUTE, "9.0 m beside"),
+        (perception(EgoPose(float("nan"), 0.0, 0.0, 4.0)), Status.INVALID_INPUT, "x_m is nan"),
+        (perception(rows=((0.0, 0.0, 0.0, float("inf")),)), Status.INVALID_INPUT, "object 1"),
+    ],
+)
+def test_a_fault_of_the_input_becomes_its_status(
+    seen: Perception, status: Status, words: str
+) -> None:
+    pipeline = SituationPipeline(Maker())
+    pipeline.select((10,))
+    report = pipeline.report(7, seen)
+    assert (report.stamp_ns, report.status, report.route) == (7, status, (10,))
+    assert words in report.text
+    assert report.situations is None
+
+
+@pytest.mark.parametrize(
+    ("error", "status"),
+    [
+        (InputError("x"), Status.INVALID_INPUT),
+        (EgoPoseError("x"), Status.OFF_ROUTE),
+        (NoConflictError("x"), Status.BAD_ROUTE),
+    ],
+)
+def test_each_kind_of_error_has_its_status(error: PlannerError, status: Status) -> None:
+    assert fault_status(error) is status
+
+
+def test_an_error_that_no_input_can_cause_is_not_swallowed() -> None:
+    with pytest.raises(MapError):
+        fault_status(MapError("x"))

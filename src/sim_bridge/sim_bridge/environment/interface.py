@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the training loop asks of an environment: B episodes side by side, restarted by itself."""
+"""What the training loop asks of an environment: B episodes side by side, one after the other.
+
+An ended episode's true last state is seen before the next one begins, one step later
+(Gymnasium calls this "next step autoreset"): learning needs it to bootstrap at a time limit.
+"""
 
 import enum
 from typing import Any, NamedTuple, Protocol
@@ -22,16 +26,17 @@ class Outcome(enum.IntEnum):
 class EnvironmentStep(NamedTuple):
     """One step of B environments.
 
+    taken (B,): whether the action was taken; it was not where the episode had ended before:
+    that environment has begun its next episode instead, and only `states` counts.
     reward (B,); discount (B,): 0 where the episode terminated, 1 else, also at a time limit.
-    final_states (B, F): what the action led to. states (B, F): what to act upon next, which is
-    the first state of a new episode where `ended` (B,). outcome (B,): Outcome.
+    outcome (B,): Outcome, RUNNING while the episode goes on. states (B, F): what the action led
+    to, in an ended episode its true last state. Arrays may be reused by the next step.
     """
 
+    taken: NDArray[np.bool_]
     reward: NDArray[np.float32]
     discount: NDArray[np.float32]
-    ended: NDArray[np.bool_]
     outcome: NDArray[np.int64]
-    final_states: States
     states: States
 
 

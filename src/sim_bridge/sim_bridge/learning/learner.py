@@ -1,110 +1,147 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The update of the paper's DQN: double Q-learning, Adam, soft target replacement.
+"""The update of the paper's DQN: double Q-learning, Adam, soft target replacement."""
 
-A batch of 16 is so small that the cost is in the number of tensor operations. All weights of a
-network therefore lie in one flat tensor, so that Adam and the target's step are one each.
-"""
-
-import copy
-from typing import Any, cast
+import math
+from typing import Any, NamedTuple
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
-from torch import nn
 
+from sim_bridge.learning import compiled_network as network
+from sim_bridge.learning.compiled_network import Signals, empty_signals
 from sim_bridge.learning.config import LearnerConfig
-from sim_bridge.learning.losses import (
-    double_q_targets,
-    td_errors,
-    weighted_loss,
-    weighted_loss_gradient,
-)
-from sim_bridge.learning.replay import Sample
-
-Floats = NDArray[np.float32]
+from sim_bridge.learning.dense import Adam, Array, adam_step, mix, shorten, vectorized
+from sim_bridge.learning.losses import double_q_target, weighted_loss, weighted_loss_slope
+from sim_bridge.learning.replay import Sample, Transitions
 
 
-def flatten_parameters(network: nn.Module) -> nn.Parameter:
-    """Move all weights of a network, and their gradients, into one flat tensor and return it.
+class Weights(NamedTuple):
+    """Flat weights (P,) of both networks, the optimiser's moments, memory for the gradient."""
 
-    The network's own parameters become views, so either side sees what the other writes.
-    """
-    parameters = list(network.parameters())
-    flat = nn.Parameter(torch.cat([p.detach().reshape(-1) for p in parameters]))
-    flat.grad = torch.zeros_like(flat)
-    start = 0
-    for parameter in parameters:
-        end = start + parameter.numel()
-        parameter.data = flat.data[start:end].view_as(parameter)
-        parameter.grad = flat.grad[start:end].view_as(parameter)
-        start = end
-    return flat
+    online: Array
+    target: Array
+    adam: Adam
+    gradient: Array
+
+
+class Workspace(NamedTuple):
+    """Memory of an update of B transitions: signals of both networks, derivatives, TD errors."""
+
+    now: Signals
+    next_online: Signals
+    next_target: Signals
+    by: Signals
+    errors: Array
+
+
+class Rates(NamedTuple):
+    """LearnerConfig as the numbers that kernels read, at one point of the run."""
+
+    learning_rate: float
+    adam_epsilon: float
+    target_rate: float
+    max_gradient_norm: float
+
+
+@vectorized
+def _update(
+    weights: Weights, rates: Rates, batch: Transitions, importance: Array, work: Workspace
+) -> float:
+    """Make one update from B transitions; fill `work.errors` (B,) and return the loss."""
+    network.values(weights.online, batch.s_t, work.next_online)
+    network.values(weights.target, batch.s_t, work.next_target)
+    network.values(weights.online, batch.s_tm1, work.now)
+    loss = 0.0
+    count = batch.r_t.shape[0]
+    work.by.q[:] = 0.0
+    for k in range(count):
+        y = double_q_target(
+            batch.r_t[k], batch.discount_t[k], work.next_online.q[k], work.next_target.q[k]
+        )
+        action = batch.a_tm1[k]
+        error = y - work.now.q[k, action]
+        work.errors[k] = error
+        work.by.q[k, action] = weighted_loss_slope(error, importance[k], count)
+        loss += weighted_loss(error, importance[k], count)
+    network.gradient(weights.online, work.now, work.by, weights.gradient)
+    if rates.max_gradient_norm < math.inf:
+        shorten(weights.gradient, rates.max_gradient_norm)
+    adam_step(
+        weights.online, weights.gradient, weights.adam, rates.learning_rate, rates.adam_epsilon
+    )
+    mix(weights.target, weights.online, rates.target_rate)
+    return loss
 
 
 class Learner:
     """Online and target network with the optimiser of the online one."""
 
-    def __init__(self, config: LearnerConfig, online: nn.Module, target: nn.Module) -> None:
-        """Take two networks of the same structure; the target starts with the online weights."""
-        target.load_state_dict(online.state_dict())
+    def __init__(self, config: LearnerConfig, weights: Array) -> None:
+        """Start both networks from flat weights (P,), in the order of the torch module."""
         self._config = config
-        self._online = online
-        self._target = target
-        self._weights = flatten_parameters(online)
-        self._target_weights = flatten_parameters(target).requires_grad_(False)
-        self._optimizer = torch.optim.Adam(
-            [self._weights], lr=config.learning_rate, eps=config.adam_epsilon, fused=True
+        self._weights = Weights(
+            online=weights.copy(),
+            target=weights.copy(),
+            adam=Adam(np.zeros_like(weights), np.zeros_like(weights), np.zeros(1, np.int64)),
+            gradient=np.zeros_like(weights),
         )
+        self._work = _workspace(0)
+        self._signals = empty_signals(0)
 
     @property
-    def network(self) -> nn.Module:
-        """The online network, to act with and to export."""
-        return self._online
+    def weights(self) -> Array:
+        """The online network's flat weights (P,); they change with every update."""
+        return self._weights.online
 
-    def q_values(self, states: Floats) -> Floats:
-        """Return Q-values (B, A) of the online network for states (B, ...)."""
-        with torch.inference_mode():
-            return cast(Floats, self._online(torch.from_numpy(states)).numpy())
+    def q_values(self, states: Array) -> Array:
+        """Return Q-values (B, 3) of the online network for flat states (B, 120), reused memory."""
+        if self._signals.q.shape[0] != states.shape[0]:
+            self._signals = empty_signals(states.shape[0])
+        network.values(self._weights.online, states, self._signals)
+        return self._signals.q
 
-    def update(self, sample: Sample, progress: float) -> tuple[Floats, float]:
-        """Make one update from a draw; return its TD errors (B,) and its loss.
+    def update(self, sample: Sample, progress: float) -> tuple[Array, float]:
+        """Make one update from a draw; return its TD errors (B,), reused memory, and its loss.
 
         `progress` is the share of the run that is over, for the learning rate.
         """
-        s_tm1, a_tm1, r_t, discount_t, s_t = sample.transitions
-        with torch.inference_mode():
-            next_states = torch.from_numpy(s_t)
-            q_t_online = self._online(next_states).numpy()
-            q_t_target = self._target(next_states).numpy()
-        q_tm1 = self._online(torch.from_numpy(s_tm1))
-        targets = double_q_targets(r_t, discount_t, q_t_online, q_t_target)
-        errors = td_errors(q_tm1.detach().numpy(), a_tm1, targets)
-        gradient = weighted_loss_gradient(errors, sample.weights, a_tm1, q_tm1.shape[1])
-        self._descend(q_tm1, torch.from_numpy(gradient), progress)
-        return errors, weighted_loss(errors, sample.weights)
-
-    def _descend(self, q_tm1: torch.Tensor, gradient: torch.Tensor, progress: float) -> None:
-        flat_gradient = cast(torch.Tensor, self._weights.grad)
-        flat_gradient.zero_()
-        torch.autograd.backward((q_tm1,), (gradient,))
-        if np.isfinite(self._config.max_gradient_norm):
-            norm = float(flat_gradient.norm())
-            flat_gradient.mul_(min(1.0, self._config.max_gradient_norm / (norm + 1e-12)))
-        self._optimizer.param_groups[0]["lr"] = self._config.rate(progress)
-        self._optimizer.step()
-        self._target_weights.data.lerp_(self._weights.data, self._config.target_rate)
+        if self._work.errors.shape != sample.weights.shape:
+            self._work = _workspace(sample.weights.shape[0])
+        config = self._config
+        rates = Rates(
+            learning_rate=config.rate(progress),
+            adam_epsilon=config.adam_epsilon,
+            target_rate=config.target_rate,
+            max_gradient_norm=config.max_gradient_norm,
+        )
+        loss = _update(self._weights, rates, sample.transitions, sample.weights, self._work)
+        return self._work.errors, loss
 
     def state_dict(self) -> dict[str, Any]:
         """Return everything that `load_state_dict` needs to go on identically."""
-        return {
-            "online": self._weights.detach().clone(),
-            "target": self._target_weights.detach().clone(),
-            "optimizer": copy.deepcopy(self._optimizer.state_dict()),
-        }
+        return {name: array.copy() for name, array in self._arrays().items()}
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
         """Take over the weights and the optimiser of an interrupted run."""
-        self._weights.data.copy_(state["online"])
-        self._target_weights.data.copy_(state["target"])
-        self._optimizer.load_state_dict(state["optimizer"])
+        for name, array in self._arrays().items():
+            array[:] = state[name]
+
+    def _arrays(self) -> dict[str, NDArray[Any]]:
+        weights = self._weights
+        return {
+            "online": weights.online,
+            "target": weights.target,
+            "adam_mean": weights.adam.mean,
+            "adam_square": weights.adam.square,
+            "adam_steps": weights.adam.steps,
+        }
+
+
+def _workspace(batch: int) -> Workspace:
+    return Workspace(
+        now=empty_signals(batch),
+        next_online=empty_signals(batch),
+        next_target=empty_signals(batch),
+        by=empty_signals(batch),
+        errors=np.zeros(batch, dtype=np.float32),
+    )

@@ -1,47 +1,37 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Double Q-learning (van Hasselt et al. 2016) as pure functions of arrays.
+"""Double Q-learning (van Hasselt et al. 2016), transition by transition, as pure functions.
 
-The gradient with respect to the network's output is written out: it is one line, and autograd
-then starts at the network. Names as in the paper, eq. (3), (4): y target, Q estimate.
+Names as in the paper, eq. (3) and (4): y is the target, Q the estimate.
 """
-
-from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float32]
-Integers = NDArray[np.int64]
+from risk_dqn_planner.compiled import kernel
+
+Array = NDArray[np.float32]
 
 
-def double_q_targets(
-    r_t: Floats, discount_t: Floats, q_t_online: Floats, q_t_target: Floats
-) -> Floats:
-    """Return y (B,): the online network chooses the next action, the target one values it.
+@kernel
+def double_q_target(r_t: float, discount_t: float, q_t_online: Array, q_t_target: Array) -> float:
+    """Return y: the online network chooses the next action, the target network values it.
 
-    r_t, discount_t (B,); q_t_online, q_t_target (B, A) at the next state.
+    q_t_online, q_t_target (A,): Q-values of the next state. discount_t is 0 after termination.
     """
-    best = q_t_online.argmax(axis=1)
-    return cast(Floats, r_t + discount_t * q_t_target[np.arange(len(best)), best])
+    value: float = r_t + discount_t * q_t_target[np.argmax(q_t_online)]
+    return value
 
 
-def td_errors(q_tm1: Floats, a_tm1: Integers, targets: Floats) -> Floats:
-    """Return y - Q(s, a) (B,) for Q-values (B, A) and the actions taken (B,)."""
-    return cast(Floats, targets - q_tm1[np.arange(len(a_tm1)), a_tm1])
+@kernel
+def weighted_loss(td_error: float, weight: float, batch: int) -> float:
+    """Return a transition's share of the importance-weighted mean square error, eq. (3).
 
-
-def weighted_loss(errors: Floats, weights: Floats) -> float:
-    """Return the importance-weighted mean of the squared TD errors (B,), eq. (3).
-
-    The paper sums; Adam's step is the same for both.
+    td_error: y - Q(s, a). The paper sums over the batch; Adam's step is the same for both.
     """
-    return float(np.mean(weights * errors * errors))
+    return weight * td_error * td_error / batch
 
 
-def weighted_loss_gradient(
-    errors: Floats, weights: Floats, a_tm1: Integers, actions: int
-) -> Floats:
-    """Return the derivative (B, A) of `weighted_loss` by the Q-values, targets held fixed."""
-    gradient = np.zeros((len(errors), actions), dtype=np.float32)
-    gradient[np.arange(len(errors)), a_tm1] = -2.0 / len(errors) * weights * errors
-    return gradient
+@kernel
+def weighted_loss_slope(td_error: float, weight: float, batch: int) -> float:
+    """Return the derivative of `weighted_loss` by Q(s, a), with the target held fixed."""
+    return -2.0 * weight * td_error / batch

@@ -27,12 +27,19 @@ class _Pending(NamedTuple):
 
 @kernel
 def _push(
-    pending: _Pending, step: Transitions, ended: NDArray[np.bool_], gamma: float, out: Transitions
+    pending: _Pending,
+    step: Transitions,
+    taken: NDArray[np.bool_],
+    ended: NDArray[np.bool_],
+    gamma: float,
+    out: Transitions,
 ) -> int:
     """Take one step of every environment; write completed sums to `out`, return how many."""
     written = 0
     horizon = pending.states.shape[1]
     for e in range(ended.shape[0]):
+        if not taken[e]:
+            continue
         slot = pending.next[e]
         pending.states[e, slot] = step.s_tm1[e]
         pending.actions[e, slot] = step.a_tm1[e]
@@ -73,13 +80,17 @@ class NStepReturns:
         )
         self._out = empty_transitions(environments * n_step, features)
 
-    def push(self, step: Transitions, ended: NDArray[np.bool_]) -> Transitions:
-        """Take one step of each environment, `ended` (E,) where its episode is over.
+    def push(
+        self, step: Transitions, taken: NDArray[np.bool_], ended: NDArray[np.bool_]
+    ) -> Transitions:
+        """Take one step of each environment in which one was `taken` (E,).
+
+        ended (E,): whether that was the last of its episode.
 
         The step's discount_t is 1 or 0 (terminated), without gamma. Returns the transitions
         that are complete, oldest first within an environment, as views reused by the next call.
         """
-        written = _push(self._pending, step, ended, self._gamma, self._out)
+        written = _push(self._pending, step, taken, ended, self._gamma, self._out)
         return Transitions._make(array[:written] for array in self._out)
 
     def state_dict(self) -> dict[str, Any]:

@@ -23,7 +23,8 @@ class Progress(NamedTuple):
     """Where a run stands, and what happened since the last report.
 
     steps, episodes, updates: since the beginning. ended (4,): training episodes since the last
-    report by Outcome. loss: mean over the updates since then, NaN if there were none.
+    report by Outcome, of which RUNNING means nothing. loss: mean over the updates since then,
+    NaN if there were none.
     """
 
     steps: int
@@ -48,7 +49,7 @@ class Trainer:
             environment.batch, config.n_step, config.gamma, environment.features
         )
         self._random = np.random.default_rng([seed, 1])
-        self._states = environment.reset()
+        self._states = environment.reset().copy()
         self._steps = 0
         self._episodes = 0
         self._updates = 0
@@ -79,14 +80,15 @@ class Trainer:
         """Make one step in every environment and the updates that belong to it."""
         actions = self._choose_actions()
         step = self._environment.step(actions)
-        single = Transitions(self._states, actions, step.reward, step.discount, step.final_states)
-        self._replay.add(self._returns.push(single, step.ended))
-        # The environment may write into the same memory with its next step.
-        self._states = step.states.copy()
-        self._steps += self._environment.batch
+        ended = step.outcome != Outcome.RUNNING
+        single = Transitions(self._states, actions, step.reward, step.discount, step.states)
+        self._replay.add(self._returns.push(single, step.taken, ended))
+        self._states[:] = step.states
+        taken = int(step.taken.sum())
+        self._steps += taken
         self._ended += np.bincount(step.outcome, minlength=len(Outcome))
-        self._episodes += int(step.ended.sum())
-        if len(self._replay) >= self._config.warmup_steps:
+        self._episodes += int(ended.sum())
+        if taken and len(self._replay) >= self._config.warmup_steps:
             for _ in range(self._config.updates_per_step):
                 self._learn()
 
@@ -149,6 +151,6 @@ class Trainer:
         self._returns.load_state_dict(state["returns"])
         self._environment.load_state_dict(state["environment"])
         self._random.bit_generator.state = state["random"]
-        self._states = state["states"].copy()
+        self._states[:] = state["states"]
         self._steps, self._episodes, self._updates, self._reports = state["counts"]
         self._restart_report()

@@ -20,7 +20,7 @@ def one_step(number: int, reward: float, discount: float = 1.0) -> Transitions:
 
 def push(returns: NStepReturns, step: Transitions, ended: bool = False) -> list[tuple[float, ...]]:
     """Return completed transitions as (s, a, r, discount, s')."""
-    out = returns.push(step, np.array([ended]))
+    out = returns.push(step, np.array([True]), np.array([ended]))
     return [
         (float(s[0]), int(a), float(r), float(d), float(n[0]))
         for s, a, r, d, n in zip(*out, strict=True)
@@ -85,9 +85,17 @@ def test_environments_do_not_mix() -> None:
             for returns, r, end in zip(apart, rewards, ended, strict=True)
             for row in push(returns, one_step(number, r), bool(end))
         ]
-        out = together.push(step, ended)
+        out = together.push(step, np.ones(3, dtype=np.bool_), ended)
         assert [float(r) for r in out.r_t] == [row[2] for row in expected]
         assert [float(d) for d in out.discount_t] == [row[3] for row in expected]
+
+
+def test_a_step_that_was_not_taken_leaves_no_trace() -> None:
+    returns = NStepReturns(1, 2, GAMMA, 1)
+    push(returns, one_step(0, 8.0))
+    out = returns.push(one_step(7, 99.0), np.array([False]), np.array([True]))
+    assert len(out.r_t) == 0
+    assert push(returns, one_step(1, 4.0)) == [(0, 0, 10.0, 0.25, 2)]
 
 
 def test_restored_sums_go_on_identically() -> None:

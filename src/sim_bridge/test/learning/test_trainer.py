@@ -9,19 +9,19 @@ from sim_bridge.environment.interface import Outcome
 from sim_bridge.learning.config import EvaluationConfig, ExplorationConfig, TrainingConfig
 from sim_bridge.learning.trainer import Progress, Trainer
 
-from .toy import CONFIGURATION, Walk, learner
+from .toy import CONFIGURATION, Walk, learner, positions
 
 LENGTH = 2
 
 
 def trainer(config: TrainingConfig, outcome: Outcome = Outcome.SUCCESS, seed: int = 0) -> Trainer:
     environment = Walk(config.environments, LENGTH, outcome)
-    return Trainer(config, environment, learner(environment.features, config, seed), seed)
+    return Trainer(config, environment, learner(config, seed), seed)
 
 
 def values(one: Trainer) -> NDArray[np.float32]:
     """Q-values (position, action) of all positions."""
-    return one.learner.q_values(np.eye(LENGTH + 1, dtype=np.float32))
+    return one.learner.q_values(positions(np.arange(LENGTH + 1))).copy()
 
 
 def reports(one: Trainer) -> list[Progress]:
@@ -49,7 +49,7 @@ def test_truncation_bootstraps_from_the_true_last_state(n_step: int) -> None:
 
 
 def test_waiting_forever_is_worth_the_geometric_sum() -> None:
-    one = trainer(replace(CONFIGURATION, steps=4000))
+    one = trainer(CONFIGURATION)
     reports(one)
     # 1 + 1/2 + 1/4 + ... = 2 for never going on.
     assert values(one)[0, :2] == pytest.approx(2.0, abs=0.05)

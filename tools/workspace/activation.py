@@ -16,7 +16,7 @@ HEADER = "# Written by tools/bootstrap.py, to be sourced by bash.\n"
 FAST_DDS_PROFILE = Path("tools") / "fastdds_quick_discovery.xml"
 
 WHEELS = """\
-unset PYTHONHOME PYTHONPATH
+unset PYTHONHOME PYTHONPATH COLCON_PREFIX_PATH
 export ROS_DISTRO=jazzy ROS_VERSION=2 ROS_PYTHON_VERSION=3 RMW_IMPLEMENTATION=rmw_fastrtps_cpp
 export AMENT_PREFIX_PATH="$VIRTUAL_ENV" CMAKE_PREFIX_PATH="$VIRTUAL_ENV"
 # Left alone, every Python started here would set this path by starting itself a second time; the

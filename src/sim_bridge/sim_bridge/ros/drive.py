@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Drives seeded episodes with the real nodes and hands each one over when it has ended."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -33,7 +33,7 @@ class DrivenEpisode:
 
 def drive(
     settings: RunSettings, seeds: Sequence[int], real_time_factor: float, log_folder: Path
-) -> Iterator[DrivenEpisode]:
+) -> Generator[DrivenEpisode, None, None]:
     """Run one episode for each seed, in three node processes over DDS.
 
     Raises:

@@ -7,7 +7,7 @@ from risk_dqn_planner.decision import Action
 from risk_dqn_planner.ros.conversions import SECOND_NS
 from sim_bridge.ros.frames import FramePublisher
 from sim_bridge.ros.pacing import DECISION_PERIOD_NS, EPISODE_GAP_NS, Pacing, pass_time
-from sim_bridge.simulation import Simulation
+from sim_bridge.simulation import Simulation, StepResult
 
 
 class EpisodePlayer:
@@ -30,23 +30,20 @@ class EpisodePlayer:
         simulation.reset([seed])
         self._now_ns = start_ns
         self._publisher.publish_start(simulation, seed, start_ns)
-        late = self._run(simulation, seed)
-        if late is not None:
-            self._publisher.publish_end(simulation, seed, self._now_ns, late)
+        self._run(simulation, seed)
 
-    def _run(self, simulation: Simulation, seed: int) -> int | None:
-        """Return the number of late decisions, None if the episode was abandoned."""
+    def _run(self, simulation: Simulation, seed: int) -> None:
         step_ns = round(simulation.scenario.timing.inner_step_s * SECOND_NS)
+        result: StepResult | None = None
         late = 0
         while self._go_on():
             self._publisher.publish_frame(simulation, seed, self._now_ns)
             self._pacing.reach(self._now_ns)
             decision = self._pacing.decision(self._now_ns)
-            if not simulation.state.running[0]:
-                return late
+            if result is not None and (result.terminated[0] or result.truncated[0]):
+                self._publisher.publish_end(simulation, seed, self._now_ns, result, late)
+                return
             if decision is None and self._now_ns % DECISION_PERIOD_NS == 0:
                 late += 1
-            action = Action.STOP if decision is None else decision.action
-            simulation.inner_step([action])
+            result = simulation.inner_step([Action.STOP if decision is None else decision.action])
             self._now_ns += step_ns
-        return None

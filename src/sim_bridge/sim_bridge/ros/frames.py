@@ -10,7 +10,7 @@ from risk_dqn_planner.situation.inputs import EgoPose, ObjectArrays
 from sim_bridge.perception import VehiclePoses
 from sim_bridge.ros import topics
 from sim_bridge.ros.transform import TransformPublisher
-from sim_bridge.simulation import Simulation
+from sim_bridge.simulation import Simulation, StepResult
 
 EGO_ID = 0
 _NODE = "simulator"
@@ -119,14 +119,19 @@ class FramePublisher:
         self._send(topics.ROUTE, route)
 
     def publish_end(
-        self, simulation: Simulation, seed: int, stamp_ns: int, late_decisions: int
+        self,
+        simulation: Simulation,
+        seed: int,
+        stamp_ns: int,
+        result: StepResult,
+        late_decisions: int,
     ) -> None:
         """Announce how an episode ended."""
-        state, figures = simulation.state, simulation.statistics()
+        figures = simulation.statistics()
         event = EpisodeEvent.TIMEOUT
-        if state.reached_goal[0]:
+        if result.reached_goal[0]:
             event = EpisodeEvent.SUCCESS
-        elif state.collided[0]:
+        elif result.collided[0]:
             event = EpisodeEvent.COLLISION
         self._send(
             topics.EPISODE,

@@ -100,6 +100,11 @@ class NodeProcess:
             )
 
     @property
+    def pid(self) -> int:
+        """Process id."""
+        return self._process.pid
+
+    @property
     def exit_code(self) -> int | None:
         """Exit code, None while the node runs."""
         return self._process.poll()

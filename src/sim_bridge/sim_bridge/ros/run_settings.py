@@ -112,6 +112,13 @@ def add_run_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--scenario", default=DEFAULT_SCENARIO, help="name [%(default)s]")
 
 
+def default_settings() -> RunSettings:
+    """Return what is driven when nothing is asked for."""
+    parser = argparse.ArgumentParser()
+    add_run_arguments(parser)
+    return run_settings(parser.parse_args([]))
+
+
 def run_settings(arguments: argparse.Namespace) -> RunSettings:
     """Complete the options: an own map brings its file, route and origin.
 

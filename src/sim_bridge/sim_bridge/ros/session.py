@@ -9,6 +9,7 @@ from contextlib import contextmanager, suppress
 from types import FrameType
 
 import rclpy
+from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
@@ -36,9 +37,10 @@ def ros_session(name: str) -> Iterator[Node]:
     """
     isolate(free_domain_id())
     signal.signal(signal.SIGTERM, _interrupt)
-    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
-    node = rclpy.create_node(name)
-    executor = SingleThreadedExecutor()
+    context = Context()
+    rclpy.init(context=context, signal_handler_options=SignalHandlerOptions.NO)
+    node = Node(name, context=context)
+    executor = SingleThreadedExecutor(context=context)
     executor.add_node(node)
 
     def spin() -> None:
@@ -53,7 +55,7 @@ def ros_session(name: str) -> Iterator[Node]:
         executor.shutdown()
         thread.join(timeout=2.0)
         node.destroy_node()
-        node.context.try_shutdown()
+        context.try_shutdown()
 
 
 def wait_until(

@@ -106,6 +106,7 @@ class SimulatorNode(Node):
         steady_timer(self, _WATCH_PERIOD_S, self._raise_failure)
         self._worker = threading.Thread(target=self._work, name="episodes", daemon=True)
         self._worker.start()
+        self.get_logger().info(f"ready on {maps.map_file}")
 
     def _declare_route(self) -> list[int]:
         name = "route"

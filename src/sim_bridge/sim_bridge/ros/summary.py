@@ -6,8 +6,13 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from intersection_msgs.msg import EpisodeEvent
+from intersection_msgs.msg import Decision, EpisodeEvent
+from rclpy.serialization import deserialize_message
 from rich.table import Table
+
+from sim_bridge.ros.recording import Stored
+from sim_bridge.ros.run_settings import RunSettings
+from sim_bridge.ros.topics import DECISION
 
 RESULTS = {
     EpisodeEvent.SUCCESS: "success",
@@ -58,6 +63,36 @@ def episode_result(event: EpisodeEvent) -> EpisodeResult:
         mean_speed_mps=round(event.mean_speed_mps, 3),
         action_counts=counts,
         late_decisions=event.late_decisions,
+    )
+
+
+def run_summary(
+    settings: RunSettings, messages: Sequence[Stored], episodes: Sequence[EpisodeResult]
+) -> RunSummary:
+    """Put settings and results together; the policy's name and hash are those it goes by."""
+    name, policy_hash = settings.policy, ""
+    decisions = [message for message in messages if message.topic == DECISION.name]
+    if decisions:
+        last = deserialize_message(decisions[-1].data, Decision)
+        name, policy_hash = last.policy_name, last.policy_hash
+    return RunSummary(
+        map=settings.map_name,
+        route=settings.route,
+        origin=(settings.origin.latitude_deg, settings.origin.longitude_deg),
+        projector=settings.projector,
+        policy=name,
+        policy_hash=policy_hash,
+        scenario=settings.scenario,
+        episodes=tuple(episodes),
+    )
+
+
+def progress_line(episode: EpisodeResult, number: int, count: int) -> str:
+    """Say how an episode went, with rich's markup."""
+    color = _COLORS[episode.result]
+    return (
+        f"episode {number}/{count} (seed {episode.seed}): [{color}]{episode.result}[/{color}] "
+        f"after {episode.duration_s:.1f} s at {episode.mean_speed_mps:.2f} m/s"
     )
 
 

@@ -1,0 +1,41 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Real node processes for tests, each group in a ROS domain of its own."""
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from planner_driver import PlannerDriver
+
+from risk_dqn_planner.intersection.builder import build_intersection
+from risk_dqn_planner.intersection.model import IntersectionModel
+from risk_dqn_planner.map.loader import load_map
+from sim_bridge.ros.node_group import NodeGroup
+from sim_bridge.ros.run_settings import RunSettings, default_settings
+from sim_bridge.ros.session import ros_session
+
+
+@pytest.fixture(scope="session")
+def settings() -> RunSettings:
+    return default_settings()
+
+
+@pytest.fixture(scope="session")
+def model(settings: RunSettings) -> IntersectionModel:
+    road_map = load_map(settings.map_file, settings.origin, settings.projector)
+    return build_intersection(road_map, settings.route)
+
+
+@pytest.fixture(scope="module")
+def planner(
+    settings: RunSettings, model: IntersectionModel, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[PlannerDriver]:
+    """Situation and policy node with the rule-based policy on the four-way crossing."""
+    logs = tmp_path_factory.mktemp("planner")
+    commands = settings.planner_commands()
+    with ros_session("test") as node, NodeGroup(commands, logs) as nodes:
+        yield PlannerDriver(node, nodes, model)

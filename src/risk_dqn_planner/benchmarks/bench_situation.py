@@ -22,7 +22,7 @@ from risk_dqn_planner.intersection.builder import build_intersection
 from risk_dqn_planner.intersection.model import IntersectionModel
 from risk_dqn_planner.map.loader import MapOrigin, load_map
 from risk_dqn_planner.ros import conversions
-from risk_dqn_planner.situation.inputs import EgoPose, ObjectArrays
+from risk_dqn_planner.situation.inputs import EgoPose, ObjectArrays, object_arrays
 from risk_dqn_planner.situation.pipeline import SituationPipeline
 from risk_dqn_planner.situation.report import Status
 
@@ -34,9 +34,7 @@ POLYGON_CORNERS = 720
 STAMP_NS = 10**9
 
 
-def random_objects(
-    model: IntersectionModel, count: int, rng: np.random.Generator
-) -> ObjectArrays:
+def random_objects(model: IntersectionModel, count: int, rng: np.random.Generator) -> ObjectArrays:
     """Return vehicles, half of them on intersecting lanes, half up to 30 m beside them."""
     paths = [path.path.centerline for lane in model.lanes for path in lane.paths]
     rows = np.empty((count, 4))
@@ -51,8 +49,7 @@ def random_objects(
             heading + rng.normal(0.0, 0.1),
             rng.uniform(0.0, 14.0),
         )
-    size = np.full(count, 4.5)
-    return ObjectArrays(np.arange(count), *np.ascontiguousarray(rows.T), size, 0.4 * size)
+    return object_arrays(rows, size_m=(4.5, 1.8))
 
 
 def random_area(ego: EgoPose, rng: np.random.Generator) -> np.ndarray:
@@ -63,7 +60,8 @@ def random_area(ego: EgoPose, rng: np.random.Generator) -> np.ndarray:
         begin, width = rng.integers(POLYGON_CORNERS), rng.integers(5, 60)
         radii[begin : begin + width] = rng.uniform(15.0, 60.0)
     corners = np.stack([radii * np.cos(angles), radii * np.sin(angles)], axis=1)
-    return corners + (ego.x_m, ego.y_m)
+    corners += np.array([ego.x_m, ego.y_m])
+    return corners
 
 
 def measure(model: IntersectionModel, count: int, repetitions: int, seed: int) -> np.ndarray:

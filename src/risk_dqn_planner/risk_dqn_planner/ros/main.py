@@ -22,7 +22,8 @@ def run(name: str, create: Callable[[], Node]) -> int:
     node = None
     try:
         node = create()
-        rclpy.spin(node)
+        if ok():
+            rclpy.spin(node)
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
     except PlannerError as error:

@@ -157,9 +157,9 @@ def _declare_one(node: Node, name: str, default: Any, metadata: Any) -> Any:  # 
 
 
 def _expected(default: object, low: float | None, high: float | None) -> str:
-    names = {bool: "true or false", int: "an integer", float: "a number with a point", str: "text"}
+    names = {bool: "true or false", int: "an integer", float: "a number such as 2.0", str: "text"}
     bounds = "" if low is None or high is None else f" from {low:g} to {high:g}"
-    return f"{names[type(default)]}{bounds}, such as {str(default) or 'a name'}"
+    return names[type(default)] + bounds
 
 
 def _described(name: str) -> str:

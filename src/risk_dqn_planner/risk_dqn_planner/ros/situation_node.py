@@ -12,7 +12,8 @@ from rclpy.node import Node
 from visualization_msgs.msg import MarkerArray
 
 from risk_dqn_planner.errors import PlannerError
-from risk_dqn_planner.intersection.builder import IntersectionConfig, build_intersection
+from risk_dqn_planner.intersection.builder import build_intersection
+from risk_dqn_planner.intersection.config import IntersectionConfig
 from risk_dqn_planner.ros import conversions, markers
 from risk_dqn_planner.ros.clock import now_ns, on_clock_back, steady_timer
 from risk_dqn_planner.ros.diagnostics import ERROR, OK, Diagnostics, freshness

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What every policy is: situations in, actions with their reasons out, for a whole batch."""
 
+import enum
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -9,11 +10,34 @@ from numpy.typing import NDArray
 from risk_dqn_planner.situation.situations import Booleans, Floats, Integers, Situations
 
 
+class Action(enum.IntEnum):
+    """High-level actions of the paper, ordered by speed ("Action Space")."""
+
+    STOP = 0
+    SLOW = 1
+    FAST = 2
+
+
+class Reason(enum.IntEnum):
+    """Why an action was chosen; the codes are those of intersection_msgs/Decision."""
+
+    CLEAR = 0  # nothing conflicts
+    VEHICLE = 1  # a perceived vehicle decides
+    HIDDEN_VEHICLE = 2  # a vehicle that may hide in an occluded lane decides
+    LEARNED = 3  # highest value of a trained network
+    GOAL_REACHED = 4
+    FIXED = 5  # the policy decides so whatever the situation
+    NO_SITUATION = 10  # nothing received yet
+    STALE_SITUATION = 11
+    INVALID_SITUATION = 12  # the situation node reports a fault, see the text
+    POLICY_FAILED = 13  # the policy could not be evaluated
+
+
 class Decisions(NamedTuple):
     """Decisions for B situations.
 
     action (B,): Action. q_values (B, 3) and action_risks (B, 3): NaN where there are none; risks
-    in [0, 1], 0 safe, 1 fully unsafe. reason (B,): decision.Reason.
+    in [0, 1], 0 safe, 1 fully unsafe. reason (B,): Reason.
     critical_vehicle (B,): index into the N vehicle places, -1 none.
     critical_lane (B,): index into the M lanes, -1 none.
     """
@@ -39,3 +63,36 @@ class Policy(Protocol):
 
     def decide(self, situations: Situations, restart: Booleans) -> Decisions:
         """Decide for each situation; `restart` (B,) marks a new episode or a gap in the input."""
+
+
+class StopsAtGoal:
+    """Any policy, with Stop once the goal is passed: there is nothing left to decide there.
+
+    Policies themselves need not think of it; `load_policy` puts this around each of them.
+    """
+
+    def __init__(self, policy: Policy) -> None:
+        self.policy = policy
+
+    @property
+    def name(self) -> str:
+        """Name of the policy inside."""
+        return self.policy.name
+
+    @property
+    def hash(self) -> str:
+        """SHA-256 of the policy inside."""
+        return self.policy.hash
+
+    def decide(self, situations: Situations, restart: Booleans) -> Decisions:
+        """Decide as the policy inside does before the goal, and Stop from there on."""
+        decisions = self.policy.decide(situations, restart)
+        at_goal = situations.goal_distance_m <= 0.0
+        if not at_goal.any():
+            return decisions
+        return decisions._replace(
+            action=np.where(at_goal, Action.STOP, decisions.action),
+            reason=np.where(at_goal, Reason.GOAL_REACHED, decisions.reason),
+            critical_vehicle=np.where(at_goal, -1, decisions.critical_vehicle),
+            critical_lane=np.where(at_goal, -1, decisions.critical_lane),
+        )

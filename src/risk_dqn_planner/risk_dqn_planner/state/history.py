@@ -104,7 +104,7 @@ def _new_memory(batch: int, vehicles: int, lanes: int) -> Memory:
     def track(room: int) -> Track:
         shape = (batch, SCENES, room)
         return Track(
-            count=np.zeros((batch, SCENES), dtype=np.int64),
+            entries=np.zeros((batch, SCENES), dtype=np.int64),
             number=np.zeros(shape, dtype=np.int64),
             lane=np.zeros(shape, dtype=np.int64),
             values=np.zeros((*shape, ROWS), dtype=np.float32),
@@ -120,7 +120,7 @@ def _new_memory(batch: int, vehicles: int, lanes: int) -> Memory:
 
 def _copy_track(old: Track, new: Track) -> None:
     room = old.number.shape[2]
-    new.count[:] = old.count
+    new.entries[:] = old.entries
     new.number[:, :, :room] = old.number
     new.lane[:, :, :room] = old.lane
     new.values[:, :, :room] = old.values

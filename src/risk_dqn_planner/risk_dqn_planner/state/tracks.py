@@ -28,11 +28,11 @@ States = NDArray[np.float32]
 class Track(NamedTuple):
     """What the last five scenes held of vehicles or of lanes, encoded.
 
-    Rings over the scenes, with room for P entries: count (B, 5); number (B, 5, P), the id of a
-    vehicle or of a lane; lane (B, 5, P), the id of its lane; values (B, 5, P, 3).
+    Rings over the scenes with room for P: entries (B, 5), how many there are; number (B, 5, P),
+    id of the vehicle or of the lane; lane (B, 5, P), id of its lane; values (B, 5, P, 3).
     """
 
-    count: Integers
+    entries: Integers
     number: Integers
     lane: Integers
     values: States
@@ -64,7 +64,7 @@ def remember_lanes(
         )
         track.values[row, head, entry, 2] = ego_distance[lane]
         entry += 1
-    track.count[row, head] = entry
+    track.entries[row, head] = entry
 
 
 @kernel
@@ -93,7 +93,7 @@ def remember_vehicles(
         )
         track.values[row, head, entry, 2] = ego_distance[lane]
         entry += 1
-    track.count[row, head] = entry
+    track.entries[row, head] = entry
 
 
 @kernel
@@ -103,7 +103,7 @@ def select(track: Track, row: int, head: int, critical: Floats, slots: Integers)
     `critical` is used up. A number takes one slot, with its most critical entry; ties go by
     number, then lane, so that the order of entries does not matter.
     """
-    count = track.count[row, head]
+    count = track.entries[row, head]
     for slot in range(slots.shape[0]):
         best, best_critical = -1, 0.0
         for entry in range(count):
@@ -169,7 +169,7 @@ def recall(
 def find(track: Track, row: int, then: int, head: int, entry: int) -> int:
     """Return the place in an earlier scene of an entry of the present one, -1 if absent."""
     number, lane = track.number[row, head, entry], track.lane[row, head, entry]
-    count = track.count[row, then]
+    count = track.entries[row, then]
     # It seldom changes its place from scene to scene: look there first.
     for i in range(-1, count):
         place = entry if i < 0 else i

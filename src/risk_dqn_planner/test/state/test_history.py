@@ -24,9 +24,11 @@ def encode_all(
 ) -> NDArray[np.float32]:
     """The state after the last of some scenes of one episode, (5, 3, 8)."""
     encoder = StateEncoder(config)
+    out = np.empty((1, 5, 3, 8), dtype=np.float32)
     for i, scene in enumerate(scenes):
-        state = encoder.encode(scene, np.array([i == 0]))
-    return state[0]
+        encoder.encode(scene, np.array([i == 0]), out)
+    state: NDArray[np.float32] = out[0]
+    return state
 
 
 def test_a_scene_is_laid_out_as_in_the_paper(situation: Make) -> None:

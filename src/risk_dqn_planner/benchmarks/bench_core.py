@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Time per situation of risk, state and rule, with 8 vehicles and 4 lanes.
+
+Run as `python benchmarks/bench_core.py`; the best of several rounds counts, first calls (which
+compile) do not.
+"""
+
+import sys
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from risk_dqn_planner.policies.rule_based import RuleBasedPolicy
+from risk_dqn_planner.risk.risk import RiskConfig, assess
+from risk_dqn_planner.situation.situations import Situations, empty_situations
+from risk_dqn_planner.state.history import StateEncoder
+
+VEHICLES, LANES, STEPS, ROUNDS = 8, 4, 5, 30
+
+
+def drive(batch: int) -> list[Situations]:
+    """Situations of a few decision steps: everyone keeps the speed."""
+    rng = np.random.default_rng(0)
+    s = empty_situations(batch, VEHICLES, LANES)
+    n, m = (batch, VEHICLES), (batch, LANES)
+    s.stop_line_distance_m[:] = rng.uniform(-10.0, 40.0, batch)
+    s.goal_distance_m[:] = s.stop_line_distance_m + 22.0
+    s.ego_speed_mps[:] = rng.uniform(0.0, 5.0, batch)
+    s.vehicle_mask[:] = True
+    s.vehicle_id[:] = np.arange(VEHICLES)
+    s.vehicle_lane[:] = rng.integers(0, LANES, n)
+    s.vehicle_distance_m[:] = rng.uniform(-5.0, 70.0, n)
+    s.vehicle_speed_mps[:] = rng.uniform(0.0, 8.0, n)
+    s.lane_mask[:] = True
+    s.lane_id[:] = np.arange(LANES)
+    s.lane_ego_distance_m[:] = s.stop_line_distance_m[:, None] + 5.5 + 3.5 * np.arange(LANES)
+    s.lane_hidden_distance_m[:] = rng.uniform(5.0, 70.0, m)
+    s.lane_speed_limit_mps[:] = 7.0
+    s.lane_ego_zone_m[:] = 6.0
+    s.lane_zone_m[:] = 6.0
+    period_s = 0.5
+    return [
+        s._replace(
+            stop_line_distance_m=s.stop_line_distance_m - travel,
+            goal_distance_m=s.goal_distance_m - travel,
+            lane_ego_distance_m=s.lane_ego_distance_m - travel[:, None],
+            vehicle_distance_m=s.vehicle_distance_m - step * period_s * s.vehicle_speed_mps,
+        )
+        for step in range(STEPS)
+        for travel in [step * period_s * s.ego_speed_mps]
+    ]
+
+
+def microseconds(work: Callable[[Situations], object], scenes: list[Situations]) -> float:
+    """Time of one situation, the best of several rounds over the scenes."""
+    batch = len(scenes[0].ego_speed_mps)
+    repeats = max(1, 200 // batch)
+    best_s = float("inf")
+    for _ in range(ROUNDS + 1):
+        begin_s = time.perf_counter()
+        for _ in range(repeats):
+            for scene in scenes:
+                work(scene)
+        best_s = min(best_s, time.perf_counter() - begin_s)
+    return best_s / (repeats * len(scenes) * batch) * 1e6
+
+
+def main() -> None:
+    """Print a table of all measurements."""
+    sys.stdout.write(f"{'us per situation':<24}{'batch 1':>12}{'batch 1024':>12}\n")
+    scenes = {batch: drive(batch) for batch in (1, 1024)}
+    none = {batch: np.zeros(batch, dtype=bool) for batch in scenes}
+    risk, rule = RiskConfig(), RuleBasedPolicy()
+    encoders = {batch: StateEncoder() for batch in scenes}
+    states = {batch: np.empty((batch, 5, 3, 8), dtype=np.float32) for batch in scenes}
+    works: dict[str, Callable[[int], Callable[[Situations], object]]] = {
+        "assess": lambda _: lambda s: assess(s, risk, include_hidden=True),
+        "encode": lambda b: lambda s: encoders[b].encode(s, none[b], states[b]),
+        "rule_based": lambda b: lambda s: rule.decide(s, none[b]),
+    }
+    for name, work in works.items():
+        times = [microseconds(work(batch), scenes[batch]) for batch in scenes]
+        sys.stdout.write(f"{name:<24}" + "".join(f"{value:>12.3f}" for value in times) + "\n")
+
+
+if __name__ == "__main__":
+    main()

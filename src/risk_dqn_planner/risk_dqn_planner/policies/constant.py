@@ -1,0 +1,39 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Policies that never change their mind: bounds in evaluations, and something simple in tests."""
+
+import numpy as np
+
+from risk_dqn_planner.policies.base import Action, Decisions, Reason
+from risk_dqn_planner.policies.fingerprint import fingerprint
+from risk_dqn_planner.situation.situations import Booleans, Situations
+
+
+class ConstantPolicy:
+    """Decides the same action whatever the situation."""
+
+    def __init__(self, action: Action) -> None:
+        self.action = action
+        self._hash = fingerprint({"policy": self.name})
+
+    @property
+    def name(self) -> str:
+        """always_stop, always_slow or always_fast."""
+        return f"always_{self.action.name.lower()}"
+
+    @property
+    def hash(self) -> str:
+        """SHA-256 of the name."""
+        return self._hash
+
+    def decide(self, situations: Situations, restart: Booleans) -> Decisions:  # noqa: ARG002
+        """Decide the same for each situation; risks are not looked at."""
+        batch = situations.ego_speed_mps.shape[0]
+        unknown = np.full((batch, len(Action)), np.nan)
+        return Decisions(
+            action=np.full(batch, self.action, dtype=np.int64),
+            q_values=unknown,
+            action_risks=unknown.copy(),
+            reason=np.full(batch, Reason.FIXED, dtype=np.int64),
+            critical_vehicle=np.full(batch, -1),
+            critical_lane=np.full(batch, -1),
+        )

@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Policies by name: built in, from a policy file, or a user's own factory."""
+
+import importlib
+from collections.abc import Callable, Mapping
+from functools import partial
+from pathlib import Path
+
+from risk_dqn_planner.errors import PolicyError, UnknownPolicyError
+from risk_dqn_planner.policies.base import Action, Policy, StopsAtGoal
+from risk_dqn_planner.policies.constant import ConstantPolicy
+from risk_dqn_planner.policies.rule_based import RuleBasedConfig, RuleBasedPolicy
+from risk_dqn_planner.state.encoding import StateConfig
+
+PolicyFactory = Callable[[RuleBasedConfig], Policy]
+
+
+def _constant(action: Action, config: RuleBasedConfig) -> Policy:  # noqa: ARG001 (a factory)
+    return ConstantPolicy(action)
+
+
+# A further built-in policy is a line here.
+BUILT_IN: Mapping[str, PolicyFactory] = {
+    "rule_based": RuleBasedPolicy,
+    "always_stop": partial(_constant, Action.STOP),
+    "always_slow": partial(_constant, Action.SLOW),
+    "always_fast": partial(_constant, Action.FAST),
+}
+
+
+def load_policy(
+    name: str,
+    config: RuleBasedConfig | None = None,
+    state: StateConfig | None = None,
+) -> Policy:
+    """Return a policy that stops at the goal.
+
+    name: a built-in policy, a policy file ("path/to/policy.pt"), or "module:factory", where the
+    factory takes a RuleBasedConfig and returns a Policy. config: prediction of Algorithm 1, for
+    the rule itself and for the risks shown with any decision. state: what a policy file must
+    have been trained on, by default StateConfig().
+    Raises UnknownPolicyError for a name that is none of these, PolicyFileError for a file that
+    cannot be used, PolicyError for a factory that fails.
+    """
+    config = config or RuleBasedConfig()
+    if name in BUILT_IN:
+        policy = BUILT_IN[name](config)
+    elif name.endswith(".pt"):
+        policy = _from_file(Path(name), config, state or StateConfig())
+    elif ":" in name:
+        policy = _from_factory(name, config)
+    else:
+        known = ", ".join(sorted(BUILT_IN))
+        raise UnknownPolicyError(
+            f"there is no policy '{name}', expected one of: {known}; "
+            "or a policy file (.pt), or a factory (module:function)"
+        )
+    return StopsAtGoal(policy)
+
+
+def _from_file(path: Path, config: RuleBasedConfig, state: StateConfig) -> Policy:
+    # Torch takes seconds to load and is not needed unless a network is asked for.
+    from risk_dqn_planner.policies.learned import LearnedPolicy  # noqa: PLC0415
+    from risk_dqn_planner.policies.policy_file import (  # noqa: PLC0415
+        PolicyContract,
+        load_policy_file,
+    )
+
+    expected = PolicyContract(
+        name="", state=state, ego=config.risk.ego, decision_period_s=config.decision_period_s
+    )
+    file = load_policy_file(path, expected)
+    return LearnedPolicy(file.module, file.name, file.sha256, state, config)
+
+
+def _from_factory(name: str, config: RuleBasedConfig) -> Policy:
+    module_name, _, function_name = name.partition(":")
+    try:
+        factory = getattr(importlib.import_module(module_name), function_name)
+    except (ImportError, AttributeError, ValueError) as error:
+        raise UnknownPolicyError(f"policy '{name}' cannot be imported: {error}") from error
+    try:
+        policy: Policy = factory(config)
+    except TypeError as error:
+        raise PolicyError(f"policy '{name}' cannot be made: {error}") from error
+    for attribute in ("name", "hash", "decide"):
+        if not hasattr(policy, attribute):
+            raise PolicyError(f"policy '{name}' has no {attribute}, expected a Policy")
+    return policy

@@ -1,0 +1,208 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Policy files: a TorchScript network that carries the contract it was trained under.
+
+The contract says what the network must be given (state layout, normalisation, rate), what its
+outputs mean (actions, target speeds), where it comes from, and one input with its output. A file
+that breaks it is refused by name: a network fed with the wrong numbers would still answer.
+"""
+
+import copy
+import dataclasses
+import hashlib
+import io
+import json
+import zipfile
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from risk_dqn_planner.errors import PolicyFileError
+from risk_dqn_planner.policies.base import Action
+from risk_dqn_planner.state.encoding import COLUMNS, LAYOUT, ROWS, SCENES, StateConfig
+from risk_dqn_planner.vehicle import EgoLimits
+
+FORMAT_VERSION = 1
+CONTRACT = "contract.json"
+STATE_SHAPE = [SCENES, ROWS, COLUMNS]
+# Other processors and versions of torch may sum in another order.
+GOLDEN_TOLERANCE = 1e-4
+
+
+@dataclass(frozen=True)
+class PolicyContract:
+    """What a policy was trained for.
+
+    maps: names of the maps trained on. training: configuration, seed and results as the trainer
+    wants them kept, JSON only. git_revision: of the code that trained it.
+    """
+
+    name: str
+    state: StateConfig = field(default_factory=StateConfig)
+    ego: EgoLimits = field(default_factory=EgoLimits)
+    decision_period_s: float = 0.5
+    maps: tuple[str, ...] = ()
+    training: Mapping[str, Any] = field(default_factory=dict)
+    git_revision: str = "unknown"
+
+    def requirements(self) -> dict[str, Any]:
+        """Return what must be the same where the policy runs."""
+        return {
+            "format_version": FORMAT_VERSION,
+            "state_layout": LAYOUT,
+            "state_shape": STATE_SHAPE,
+            "normalisation": dataclasses.asdict(self.state),
+            "actions": [action.name for action in Action],
+            "target_speeds_mps": [0.0, self.ego.slow_mps, self.ego.fast_mps],
+            "decision_period_s": self.decision_period_s,
+        }
+
+
+@dataclass(frozen=True)
+class PolicyFile:
+    """A loaded policy file: its network, all that its contract says, and the file's SHA-256."""
+
+    name: str
+    module: torch.jit.ScriptModule
+    contract: Mapping[str, Any]
+    sha256: str
+
+
+def save_policy(path: Path | str, network: torch.nn.Module, contract: PolicyContract) -> str:
+    """Write a policy file and return its SHA-256; the same network gives the same file."""
+    scripted = torch.jit.script(copy.deepcopy(network).eval())
+    state = _golden_state()
+    document = {
+        "name": contract.name,
+        **contract.requirements(),
+        "maps": list(contract.maps),
+        "training": dict(contract.training),
+        "git_revision": contract.git_revision,
+        "golden": {"state": state.tolist(), "q_values": _evaluate(scripted, state).tolist()},
+    }
+    text = json.dumps(document, indent=1, sort_keys=True)
+    data = _serialise(_without_origin(scripted), {CONTRACT: text})
+    Path(path).write_bytes(data)
+    return hashlib.sha256(data).hexdigest()
+
+
+def load_policy_file(path: Path | str, expected: PolicyContract | None = None) -> PolicyFile:
+    """Read a policy file and check it against what is expected here (by default: the defaults).
+
+    Raises PolicyFileError if the file is missing, is no TorchScript, has no contract, was
+    trained for another state, other actions or another rate, or does not compute what it did.
+    """
+    try:
+        data = Path(path).read_bytes()
+    except OSError as error:
+        raise PolicyFileError(f"policy file {path} cannot be read: {error.strerror}") from error
+    files = {CONTRACT: ""}
+    try:
+        module = _deserialise(data, files)
+    except (RuntimeError, ValueError) as error:
+        raise PolicyFileError(f"policy file {path} is not a TorchScript file") from error
+    contract = _read_contract(path, files[CONTRACT])
+    for name, value in (expected or PolicyContract(name="")).requirements().items():
+        _require_equal(path, name, contract.get(name), value)
+    _check_golden(path, module.eval(), contract)
+    return PolicyFile(str(contract["name"]), module, contract, hashlib.sha256(data).hexdigest())
+
+
+def _serialise(module: torch.jit.ScriptModule, files: dict[str, str]) -> bytes:
+    """Save through a buffer, since torch writes a file's own name into the file."""
+    buffer = io.BytesIO()
+    torch.jit.save(module, buffer, _extra_files=files)
+    return buffer.getvalue()
+
+
+def _deserialise(data: bytes, files: dict[str, str]) -> torch.jit.ScriptModule:
+    module: torch.jit.ScriptModule = torch.jit.load(  # type: ignore[no-untyped-call]
+        io.BytesIO(data), map_location="cpu", _extra_files=files
+    )
+    return module
+
+
+def _without_origin(module: torch.jit.ScriptModule) -> torch.jit.ScriptModule:
+    """Forget which source files a module was compiled from, paths of the machine included."""
+    stripped = io.BytesIO()
+    with (
+        zipfile.ZipFile(io.BytesIO(_serialise(module, {}))) as source,
+        zipfile.ZipFile(stripped, "w") as target,
+    ):
+        for name in source.namelist():
+            if not name.endswith(".debug_pkl"):
+                target.writestr(name, source.read(name))
+    return _deserialise(stripped.getvalue(), {})
+
+
+def _golden_state() -> NDArray[np.float32]:
+    """Return some states, shape (2, 5, 3, 8), that are nothing in particular."""
+    values = np.random.default_rng(0).uniform(-1.0, 1.0, (2, *STATE_SHAPE))
+    return values.round(4).astype(np.float32)
+
+
+def _evaluate(module: torch.nn.Module, state: NDArray[np.float32]) -> NDArray[np.float32]:
+    with torch.inference_mode():
+        values: NDArray[np.float32] = module(torch.from_numpy(state)).numpy()
+        return values
+
+
+def _read_contract(path: Path | str, text: str | bytes) -> dict[str, Any]:
+    if not text:
+        raise PolicyFileError(f"policy file {path} has no {CONTRACT}; save it with save_policy")
+    try:
+        contract = json.loads(text)
+    except ValueError as error:
+        raise PolicyFileError(f"policy file {path}: {CONTRACT} is not JSON: {error}") from error
+    if not isinstance(contract, dict) or not isinstance(contract.get("name"), str):
+        raise PolicyFileError(f"policy file {path}: {CONTRACT} has no name of the policy")
+    return contract
+
+
+def _require_equal(path: Path | str, name: str, value: object, expected: object) -> None:
+    """Compare part by part, so that the sentence names the one number that differs."""
+    if isinstance(expected, Mapping) and isinstance(value, Mapping):
+        for key in sorted(expected.keys() | value.keys()):
+            _require_equal(path, f"{name}.{key}", value.get(key), expected.get(key))
+    elif value != expected:
+        raise PolicyFileError(f"policy file {path}: {name} is {value}, expected {expected}")
+
+
+def _check_golden(
+    path: Path | str, module: torch.jit.ScriptModule, contract: Mapping[str, Any]
+) -> None:
+    try:
+        golden = contract["golden"]
+        state = np.asarray(golden["state"], dtype=np.float32)
+        expected = np.asarray(golden["q_values"], dtype=np.float32)
+    except (KeyError, TypeError, ValueError) as error:
+        raise PolicyFileError(
+            f"policy file {path}: {CONTRACT} has no golden state with its q_values"
+        ) from error
+    if state.ndim != 4 or list(state.shape[1:]) != STATE_SHAPE:
+        raise PolicyFileError(
+            f"policy file {path}: the golden state has shape {state.shape}, "
+            f"expected (B, {', '.join(map(str, STATE_SHAPE))})"
+        )
+    try:
+        values = np.asarray(_evaluate(module, state))
+    except (RuntimeError, AttributeError, TypeError) as error:
+        raise PolicyFileError(
+            f"policy file {path}: the network cannot take states of shape {state.shape}"
+        ) from error
+    shape = (state.shape[0], len(Action))
+    if values.shape != shape:
+        raise PolicyFileError(
+            f"policy file {path}: the network returns shape {values.shape}, expected {shape}"
+        )
+    if expected.shape != shape or not np.allclose(
+        values, expected, rtol=GOLDEN_TOLERANCE, atol=GOLDEN_TOLERANCE
+    ):
+        raise PolicyFileError(
+            f"policy file {path}: the network returns {values.tolist()} for the golden state, "
+            f"expected {expected.tolist()}"
+        )

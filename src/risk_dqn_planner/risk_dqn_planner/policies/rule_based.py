@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Algorithm 1 of the paper: the fastest action that stays safe for a while."""
+
+import dataclasses
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from risk_dqn_planner.errors import ConfigurationError
+from risk_dqn_planner.policies.base import Action, Decisions, Reason
+from risk_dqn_planner.policies.fingerprint import fingerprint
+from risk_dqn_planner.risk.risk import ActionRewards, RiskConfig, predict_actions
+from risk_dqn_planner.situation.situations import Booleans, Floats, Integers, Situations
+
+
+@dataclass(frozen=True)
+class RuleBasedConfig:
+    """How far Algorithm 1 looks ahead, 4 times 0.5 s, and what it holds for safe."""
+
+    prediction_steps: int = field(
+        default=4,
+        metadata={"description": "Decision periods that the worst case is predicted over",
+                  "minimum": 1, "maximum": 20},
+    )  # fmt: skip
+    decision_period_s: float = field(
+        default=0.5,
+        metadata={"description": "Time from one decision to the next [s]",
+                  "minimum": 0.05, "maximum": 5.0},
+    )  # fmt: skip
+    risk: RiskConfig = field(default_factory=RiskConfig)
+
+    def __post_init__(self) -> None:
+        if self.prediction_steps < 1:
+            raise ConfigurationError(
+                f"RuleBasedConfig.prediction_steps is {self.prediction_steps}, expected 1 or more"
+            )
+        if not self.decision_period_s > 0.0:
+            raise ConfigurationError(
+                f"RuleBasedConfig.decision_period_s is {self.decision_period_s}, "
+                "expected a number above 0"
+            )
+
+    @property
+    def horizon_s(self) -> float:
+        """How far the worst case is predicted."""
+        return self.prediction_steps * self.decision_period_s
+
+
+class RuleBasedPolicy:
+    """The fastest of fast and slow that is safe after a worst-case prediction, else stop.
+
+    As printed, the loop of Algorithm 1 lacks its break, so that slow would overwrite fast; the
+    text holds ("always takes the fastest safe velocity"). Safe means that for every perceived
+    and every virtual vehicle R_CSS or R_CSL is 0 in the predicted situation, R_risk = 0.
+    """
+
+    def __init__(self, config: RuleBasedConfig | None = None) -> None:
+        self.config = config or RuleBasedConfig()
+        self._hash = fingerprint({"policy": self.name} | dataclasses.asdict(self.config))
+
+    @property
+    def name(self) -> str:
+        """Name for logs and messages."""
+        return "rule_based"
+
+    @property
+    def hash(self) -> str:
+        """SHA-256 of the configuration."""
+        return self._hash
+
+    def decide(self, situations: Situations, restart: Booleans) -> Decisions:  # noqa: ARG002
+        """Decide for each situation; nothing is remembered."""
+        ahead = foresee(situations, self.config)
+        safe = ahead.total >= 0.0
+        action = np.where(
+            safe[:, Action.FAST], Action.FAST, np.where(safe[:, Action.SLOW], Action.SLOW, 0)
+        )
+        vehicle, lane = what_decided(ahead, action)
+        hindered = np.where(vehicle >= 0, Reason.VEHICLE, Reason.HIDDEN_VEHICLE)
+        return Decisions(
+            action=action,
+            q_values=np.full(ahead.total.shape, np.nan),
+            action_risks=risks(ahead),
+            reason=np.where(action == Action.FAST, Reason.CLEAR, hindered),
+            critical_vehicle=vehicle,
+            critical_lane=lane,
+        )
+
+
+def foresee(situations: Situations, config: RuleBasedConfig) -> ActionRewards:
+    """Return the worst case that each action leads to, all vehicles and hidden ones included."""
+    return predict_actions(situations, config.risk, config.horizon_s)
+
+
+def risks(ahead: ActionRewards) -> Floats:
+    """Return the risk (B, 3) of each action, 0 safe to 1 fully unsafe."""
+    return 0.0 - ahead.total
+
+
+def what_decided(ahead: ActionRewards, action: Integers) -> tuple[Integers, Integers]:
+    """Return the critical vehicle and lane (B,) that forbid the next faster action.
+
+    For FAST there is none faster: what makes FAST itself risky, if anything does.
+    """
+    faster = np.minimum(action + 1, Action.FAST)[:, None]
+    vehicle = np.take_along_axis(ahead.critical_vehicle, faster, axis=1)[:, 0]
+    lane = np.take_along_axis(ahead.critical_lane, faster, axis=1)[:, 0]
+    return vehicle, lane

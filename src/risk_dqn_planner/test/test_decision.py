@@ -1,0 +1,141 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What goes out in words agrees with the fields beside it."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from risk_dqn_planner.decision import Action, Decision, Reason, explain, fault_decision
+from risk_dqn_planner.policies.base import Decisions, StopsAtGoal
+from risk_dqn_planner.policies.constant import ConstantPolicy
+from risk_dqn_planner.policies.rule_based import RuleBasedConfig, RuleBasedPolicy
+from risk_dqn_planner.risk.config import RiskConfig
+from risk_dqn_planner.situation.situations import Situations
+from risk_dqn_planner.vehicle import EgoLimits
+
+Make = Callable[..., Situations]
+LANE: dict[str, Any] = {"id": 12, "ego_m": 5.5}
+
+
+def by_rule(s: Situations) -> Decision:
+    policy = StopsAtGoal(RuleBasedPolicy())
+    return explain(policy.decide(s, np.ones(1, dtype=bool)), s, 0, policy)
+
+
+def test_a_clear_road(situation: Make) -> None:
+    decision = by_rule(situation([LANE]))
+    assert decision.text == "FAST: no conflict within range"
+    assert (decision.action, decision.target_speed_mps) == (Action.FAST, 5.0)
+    assert decision.reason is Reason.CLEAR
+    assert (decision.critical_vehicle_id, decision.critical_lane_id) == (None, None)
+    assert decision.policy_name == "rule_based"
+    assert len(decision.policy_hash) == 64
+
+
+def test_a_vehicle_that_forbids_to_go(situation: Make) -> None:
+    # 21 m to the zone at 7 m/s; the ego leaves 2.4246 s after 2 s of Slow.
+    decision = by_rule(situation([LANE], [{"id": 17, "lane": 12, "m": 24.0, "mps": 7.0}]))
+    assert decision.text == (
+        "STOP: vehicle 17 can reach the conflict zone of lane 12 in 3.0 s, "
+        "the ego going SLOW leaves it in 4.4 s (gap wanted: 3 s)"
+    )
+    assert (decision.action, decision.target_speed_mps) == (Action.STOP, 0.0)
+    assert decision.reason is Reason.VEHICLE
+    assert (decision.critical_vehicle_id, decision.critical_lane_id) == (17, 12)
+
+
+def test_a_vehicle_in_the_zone(situation: Make) -> None:
+    decision = by_rule(situation([LANE], [{"id": 17, "lane": 12, "m": 2.0, "mps": 0.0}]))
+    assert decision.text.startswith(
+        "STOP: vehicle 17 is in the conflict zone of lane 12, the ego going SLOW"
+    )
+
+
+def test_a_lane_that_may_hide_a_vehicle(situation: Make) -> None:
+    # Slow is possible 12 m before the line; Fast would leave after 2 s and 10 m and then
+    # another 7.5 + 3 m at 5 m/s.
+    s = situation([{"id": 12, "ego_m": 17.5, "hidden_m": 18.25}], stop_line_m=12.0, ego_mps=5.0)
+    decision = by_rule(s)
+    assert decision.text == (
+        "SLOW: lane 12 hides whatever is beyond 18.2 m; a vehicle there at 7.0 m/s reaches the "
+        "conflict zone in 2.2 s, the ego going FAST leaves it in 4.1 s (gap wanted: 3 s)"
+    )
+    assert (decision.action, decision.target_speed_mps) == (Action.SLOW, 1.0)
+    assert decision.reason is Reason.HIDDEN_VEHICLE
+    assert (decision.critical_vehicle_id, decision.critical_lane_id) == (None, 12)
+    assert decision.action_risks[Action.SLOW] == 0.0
+    assert decision.action_risks[Action.FAST] > 0.0
+
+
+def test_a_leader_on_a_merging_lane(situation: Make) -> None:
+    # The ego is 1 m before the join, the leader 8 m past it.
+    lane = {"id": 12, "ego_m": -9.0, "ego_zone_m": 20.0, "zone_m": 20.0, "merging": True}
+    s = situation([lane], [{"id": 4, "lane": 12, "m": -18.0, "mps": 0.5}], ego_mps=3.0)
+    assert by_rule(s).text == "SLOW: vehicle 4 from lane 12 is 9.0 m ahead at 0.5 m/s"
+
+
+def test_the_goal(situation: Make) -> None:
+    decision = by_rule(situation([LANE], goal_m=0.0))
+    assert decision.text == "STOP: the goal is reached"
+    assert decision.reason is Reason.GOAL_REACHED
+
+
+def test_a_constant_policy(situation: Make) -> None:
+    policy, s = ConstantPolicy(Action.SLOW), situation([LANE])
+    decision = explain(policy.decide(s, np.ones(1, dtype=bool)), s, 0, policy)
+    assert decision.text == "SLOW: always_slow decides the same whatever happens"
+    assert decision.target_speed_mps == 1.0
+
+
+def learned(s: Situations, critical: int) -> Decision:
+    decisions = Decisions(
+        action=np.array([Action.SLOW]),
+        q_values=np.array([[-0.25, 0.5, 0.125]]),
+        action_risks=np.array([[0.0, 0.0, 0.5]]),
+        reason=np.array([Reason.LEARNED]),
+        critical_vehicle=np.array([critical]),
+        critical_lane=np.array([critical]),
+    )
+    return explain(decisions, s, 0, ConstantPolicy(Action.SLOW))
+
+
+def test_a_network_lists_its_values_and_what_it_risks(situation: Make) -> None:
+    s = situation([LANE], [{"id": 17, "lane": 12, "m": 24.0, "mps": 7.0}])
+    values = "SLOW: highest value of always_slow (STOP -0.25, SLOW 0.5, FAST 0.125)"
+    assert learned(s, critical=-1).text == values
+    assert learned(s, critical=0).text.startswith(f"{values}; vehicle 17 can reach")
+    np.testing.assert_array_equal(learned(s, critical=0).q_values, [-0.25, 0.5, 0.125])
+
+
+def test_limits_of_the_configuration_reach_the_words(situation: Make) -> None:
+    config = RuleBasedConfig(risk=RiskConfig(desired_gap_s=4.0, ego=EgoLimits(slow_mps=2.0)))
+    policy = RuleBasedPolicy(config)
+    s = situation([{"id": 12, "ego_m": 17.5, "hidden_m": 18.0}], stop_line_m=12.0, ego_mps=5.0)
+    decision = explain(policy.decide(s, np.ones(1, dtype=bool)), s, 0, policy, config)
+    assert decision.target_speed_mps == 2.0
+    assert "gap wanted: 4 s" in decision.text
+
+
+def test_one_of_a_batch_is_explained(random_situations: Make) -> None:
+    s, policy = random_situations(seed=4, batch=100), RuleBasedPolicy()
+    decisions = policy.decide(s, np.ones(100, dtype=bool))
+    for i in range(100):
+        decision = explain(decisions, s, i, policy)
+        assert decision.text.startswith(decision.action.name)
+        vehicle, lane = decision.critical_vehicle_id, decision.critical_lane_id
+        assert (f"vehicle {vehicle} " in decision.text) == (vehicle is not None)
+        assert (f"lane {lane}" in decision.text) == (lane is not None)
+        assert "\n" not in decision.text
+
+
+@pytest.mark.parametrize("reason", [Reason.NO_SITUATION, Reason.POLICY_FAILED])
+def test_a_fault_is_answered_with_stop(reason: Reason) -> None:
+    decision = fault_decision(reason, "nothing received yet", "rule_based", "abc")
+    assert (decision.action, decision.target_speed_mps) == (Action.STOP, 0.0)
+    assert decision.text == "STOP: nothing received yet"
+    assert decision.reason is reason
+    assert np.isnan(decision.q_values).all()
+    assert np.isnan(decision.action_risks).all()
+    assert (decision.policy_name, decision.policy_hash) == ("rule_based", "abc")

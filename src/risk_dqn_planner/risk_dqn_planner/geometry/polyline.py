@@ -158,6 +158,19 @@ class Polyline:
         """Return the heading of the segment at arc length s [rad]."""
         return float(self.heading[segment_index_kernel(self.s, float(s))])
 
+    def crossings(self, other: "Polyline") -> Floats:
+        """Return the arc lengths (N,) of this line at which the other one crosses it, sorted."""
+        start, step = self.xy[:-1, None, :], np.diff(self.xy, axis=0)[:, None, :]
+        other_start, other_step = other.xy[None, :-1, :], np.diff(other.xy, axis=0)[None, :, :]
+        apart = other_start - start
+        with np.errstate(divide="ignore", invalid="ignore"):
+            turn = _cross(step, other_step)
+            share = _cross(apart, other_step) / turn
+            other_share = _cross(apart, step) / turn
+        hit = (share >= 0) & (share < 1) & (other_share >= 0) & (other_share <= 1)
+        rows, columns = np.nonzero(hit)
+        return np.sort(self.s[rows] + share[rows, columns] * np.diff(self.s)[rows])
+
     def project(
         self,
         x: float,
@@ -176,3 +189,9 @@ class Polyline:
                 float(max_heading_difference),
             )
         )
+
+
+def _cross(first: Floats, second: Floats) -> Floats:
+    """Return the cross product (...) of plane vectors (..., 2)."""
+    product: Floats = first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0]
+    return product

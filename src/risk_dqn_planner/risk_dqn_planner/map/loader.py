@@ -23,6 +23,7 @@ LineString = Any
 LaneletMap = Any
 Projector = Any
 TrafficRules = Any
+RegulatoryElement = Any
 
 LOCAL_XY = "local_xy"
 PROJECTORS: dict[str, Projector] = {

@@ -99,7 +99,7 @@ def _straightest(
         lanelet = min(open_ways, key=lambda way: (round(turn_rad(way), 3), lanelet_key(way)))
         seen.add(int(lanelet.id))
         found.append(lanelet)
-        length_m -= _length_m(lanelet)
+        length_m -= lanelet_length_m(lanelet)
     return found
 
 
@@ -121,6 +121,7 @@ def _direction(points: Sequence[tuple[float, float]]) -> float:
     return math.atan2(point[1] - start[1], point[0] - start[0])
 
 
-def _length_m(lanelet: Lanelet) -> float:
+def lanelet_length_m(lanelet: Lanelet) -> float:
+    """Return the length of a lanelet's centreline in the plane [m]."""
     points = [(point.x, point.y) for point in lanelet.centerline]
     return sum(math.dist(a, b) for a, b in pairwise(points))

@@ -89,7 +89,7 @@ RING_ANGLE = math.radians(30.0)
 RING_STEP = math.radians(2.5)
 RING_INNER_M = 24.0
 # At which of a curve's points an entry's stop line lies.
-RING_STOP_POINT = 9
+RING_STOP_POINT = 11
 
 
 def roundabout() -> Drawing:

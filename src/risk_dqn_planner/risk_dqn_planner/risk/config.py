@@ -36,10 +36,26 @@ class RiskConfig:
     the length of both footprints, and what must stay between them at rest.
     """
 
-    stop_margin_m: float = 0.1
-    desired_gap_s: float = 3.0
-    safe_gap_s: float = 0.1
-    leader_margin_m: float = 1.0
+    stop_margin_m: float = field(
+        default=0.1,
+        metadata={"description": "Room to leave before a conflict zone at rest [m]",
+                  "minimum": 0.0, "maximum": 20.0},
+    )  # fmt: skip
+    desired_gap_s: float = field(
+        default=3.0,
+        metadata={"description": "Time gap behind the ego that counts as fully safe, t_des [s]",
+                  "minimum": 0.0, "maximum": 30.0},
+    )  # fmt: skip
+    safe_gap_s: float = field(
+        default=0.1,
+        metadata={"description": "Time gap below which all is lost, t_safe [s]",
+                  "minimum": 0.0, "maximum": 30.0},
+    )  # fmt: skip
+    leader_margin_m: float = field(
+        default=1.0,
+        metadata={"description": "Room to leave behind a leader's footprint at rest [m]",
+                  "minimum": 0.0, "maximum": 50.0},
+    )  # fmt: skip
     ego: EgoLimits = field(default_factory=EgoLimits)
     traffic: TrafficLimits = field(default_factory=TrafficLimits)
     vehicle: VehicleDimensions = field(default_factory=VehicleDimensions)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Typed wrappers of numba: the core's arithmetic is compiled once and cached on disk.
+"""Typed wrappers of numba: the core's arithmetic is compiled once and kept on disk.
 
 A function is written for scalars or small loops, in plain Python. `kernel` compiles it,
 `elementwise` also lets it broadcast over arrays of any shape. Both can be called from
@@ -7,33 +7,48 @@ other kernels, so batches (training) and a batch of one (vehicle) run the same c
 `NUMBA_DISABLE_JIT=1` runs kernels as plain Python, for a debugger.
 """
 
-from collections import namedtuple
-from collections.abc import Callable
-from dataclasses import fields
-from functools import lru_cache
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any, TypeVar, cast
 
 import numba
 
+from risk_dqn_planner.compiled_cache import cache_folder
+
 Function = TypeVar("Function", bound=Callable[..., Any])
+
+# Its hints leave out what is used here.
+_numba: Any = numba
+
+# Reordering of sums and fused products, but never an assumption that numbers are finite.
+_REORDERING = {"reassoc", "contract", "nsz"}
 
 
 def kernel(function: Function) -> Function:
     """Compile a function; division by zero follows IEEE 754 as in numpy."""
-    return cast(Function, numba.njit(cache=True, error_model="numpy")(function))
+    with _cache_of(function):
+        return cast(Function, _numba.njit(cache=True, error_model="numpy")(function))
+
+
+def reordering_kernel(function: Function) -> Function:
+    """Compile a function whose sums may be reordered, so that they run in vector registers."""
+    with _cache_of(function):
+        compiled = _numba.njit(cache=True, error_model="numpy", fastmath=_REORDERING)(function)
+        return cast(Function, compiled)
 
 
 def elementwise(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile a function of scalars into one that broadcasts like a numpy ufunc."""
-    return cast(Callable[..., Any], numba.vectorize(cache=True)(function))
+    with _cache_of(function):
+        return cast(Callable[..., Any], _numba.vectorize(cache=True)(function))
 
 
-@lru_cache(maxsize=None)
-def _record_type(config_type: type) -> Any:
-    return namedtuple(f"{config_type.__name__}Record", [f.name for f in fields(config_type)])
-
-
-def record(config: Any) -> Any:
-    """Turn a frozen dataclass of numbers into a named tuple that kernels accept."""
-    values = (getattr(config, field.name) for field in fields(config))
-    return _record_type(type(config))(*values)
+@contextmanager
+def _cache_of(function: Callable[..., Any]) -> Iterator[None]:
+    """Let numba keep what it compiles in the folder that fits the function's sources."""
+    before = _numba.config.CACHE_DIR
+    _numba.config.CACHE_DIR = before or cache_folder(function.__module__)
+    try:
+        yield
+    finally:
+        _numba.config.CACHE_DIR = before

@@ -10,7 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from risk_dqn_planner.decision import Action
+from risk_dqn_planner.compiled import reordering_kernel
+from risk_dqn_planner.policies.base import Action
 from risk_dqn_planner.state.encoding import COLUMNS, LANES, ROWS, SCENES, VEHICLES
 from sim_bridge.learning.dense import (
     Array,
@@ -21,7 +22,6 @@ from sim_bridge.learning.dense import (
     layer_at,
     rectify,
     rectify_backward,
-    vectorized,
 )
 
 INPUTS = SCENES * ROWS
@@ -91,7 +91,7 @@ def empty_signals(batch: int) -> Signals:
     )
 
 
-@vectorized
+@reordering_kernel
 def layers_of(flat: Array) -> Layers:
     """Return the layers whose weights, or their derivatives, the flat array (P,) holds."""
     return Layers(
@@ -104,7 +104,7 @@ def layers_of(flat: Array) -> Layers:
     )
 
 
-@vectorized
+@reordering_kernel
 def split_columns(states: Array, signals: Signals) -> None:
     """Give each column of the states (B, 5 x 3 x 8) its row of 15 inputs."""
     for row in range(states.shape[0]):
@@ -117,7 +117,7 @@ def split_columns(states: Array, signals: Signals) -> None:
                 signals.inputs_lane[row * LANES + k, i] = values[1 + VEHICLES + k]
 
 
-@vectorized
+@reordering_kernel
 def join_columns(signals: Signals) -> None:
     """Put the embeddings of a state side by side: ego, vehicles, lanes."""
     for row in range(signals.joined.shape[0]):
@@ -131,7 +131,7 @@ def join_columns(signals: Signals) -> None:
                 signals.joined[row, (1 + VEHICLES + k) * EMBEDDING + j] = value
 
 
-@vectorized
+@reordering_kernel
 def part_columns(signals: Signals) -> None:
     """Undo `join_columns`."""
     for row in range(signals.joined.shape[0]):
@@ -145,7 +145,7 @@ def part_columns(signals: Signals) -> None:
                 signals.embedded_lane[row * LANES + k, j] = value
 
 
-@vectorized
+@reordering_kernel
 def values(weights: Array, states: Array, signals: Signals) -> None:
     """Fill the signals for the states (B, 120); `signals.q` (B, 3) holds the Q-values."""
     layers = layers_of(weights)
@@ -162,7 +162,7 @@ def values(weights: Array, states: Array, signals: Signals) -> None:
     forward(signals.hidden_second, layers.output, signals.q)
 
 
-@vectorized
+@reordering_kernel
 def gradient(weights: Array, signals: Signals, by: Signals, by_weights: Array) -> None:
     """Fill the derivative by the weights (P,) of a loss whose derivative by Q is `by.q`.
 

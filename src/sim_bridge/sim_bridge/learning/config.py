@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """All numbers of a training run, grouped by what they govern; presets.py gives them values."""
 
-import math
 from dataclasses import dataclass
 
 from risk_dqn_planner.errors import ConfigurationError
@@ -66,7 +65,8 @@ class LearnerConfig:
     """Adam on the squared TD error, and how fast the target network follows.
 
     target_rate: share of the online weights mixed into the target's after each update, the
-    paper's "soft target replacement". max_gradient_norm: infinity leaves gradients alone.
+    paper's "soft target replacement". max_gradient_norm: longer gradients are
+    shortened to it; None leaves them alone.
     learning_rate falls linearly to learning_rate_end over the run.
     """
 
@@ -74,12 +74,12 @@ class LearnerConfig:
     learning_rate_end: float = 1e-5
     target_rate: float = 0.2
     adam_epsilon: float = 1e-8
-    max_gradient_norm: float = math.inf
+    max_gradient_norm: float | None = None
 
     def __post_init__(self) -> None:
         for name in ("learning_rate", "learning_rate_end", "adam_epsilon", "max_gradient_norm"):
             value = getattr(self, name)
-            _require(value > 0.0, f"LearnerConfig.{name}", value, "above 0")
+            _require(value is None or value > 0.0, f"LearnerConfig.{name}", value, "above 0")
         _require(
             0.0 < self.target_rate <= 1.0,
             "LearnerConfig.target_rate",

@@ -6,24 +6,17 @@ loops take four rows at a time, so that what is loaded serves four products. Sum
 reordered by the compiler: results are repeatable, but not the last bit of any other order.
 """
 
-from collections.abc import Callable
-from typing import Any, NamedTuple, TypeVar, cast
+from typing import NamedTuple
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
-Function = TypeVar("Function", bound=Callable[..., Any])
+from risk_dqn_planner.compiled import reordering_kernel
+
 Array = NDArray[np.float32]
 
 ZERO = np.float32(0.0)
 PART = 32
-
-
-def vectorized(function: Function) -> Function:
-    """Compile a function whose sums may be reordered, so that they run in vector registers."""
-    options = {"reassoc", "contract", "nsz"}
-    return cast(Function, numba.njit(cache=True, error_model="numpy", fastmath=options)(function))
 
 
 class Layer(NamedTuple):
@@ -33,14 +26,14 @@ class Layer(NamedTuple):
     bias: Array
 
 
-@vectorized
+@reordering_kernel
 def layer_at(flat: Array, start: int, outputs: int, inputs: int) -> Layer:
     """Return the layer whose weight and then bias begin at `start` of a flat array, as views."""
     end = start + outputs * inputs
     return Layer(flat[start:end].reshape(outputs, inputs), flat[end : end + outputs])
 
 
-@vectorized
+@reordering_kernel
 def forward(x: Array, layer: Layer, y: Array) -> None:
     """Write W x + b of each row of x (B, I) to y (B, O)."""
     w, b = layer
@@ -68,7 +61,7 @@ def forward(x: Array, layer: Layer, y: Array) -> None:
             y[r, o] = dot(x[r], w[o]) + b[o]
 
 
-@vectorized
+@reordering_kernel
 def dot(a: Array, b: Array) -> np.float32:
     """Return the scalar product of two vectors."""
     total = ZERO
@@ -77,7 +70,7 @@ def dot(a: Array, b: Array) -> np.float32:
     return total
 
 
-@vectorized
+@reordering_kernel
 def rectify(y: Array) -> None:
     """Replace negative values of y (B, O) by 0."""
     for r in range(y.shape[0]):
@@ -85,7 +78,7 @@ def rectify(y: Array) -> None:
             y[r, o] = max(y[r, o], ZERO)
 
 
-@vectorized
+@reordering_kernel
 def rectify_backward(y: Array, gradient: Array) -> None:
     """Zero the gradient (B, O) where the rectified y (B, O) is not above 0."""
     for r in range(y.shape[0]):
@@ -94,7 +87,7 @@ def rectify_backward(y: Array, gradient: Array) -> None:
                 gradient[r, o] = ZERO
 
 
-@vectorized
+@reordering_kernel
 def add_product(a: Array, b: Array, c: Array) -> None:
     """Add the product of a (R, K) and b (K, I) to c (R, I).
 
@@ -125,7 +118,7 @@ def add_product(a: Array, b: Array, c: Array) -> None:
                     c0[i] += a[rows - 1, k] * b[k, i]
 
 
-@vectorized
+@reordering_kernel
 def backward_weights(gradient: Array, x: Array, out: Layer) -> None:
     """Write the derivative by weight and bias, from that by y (B, O) and the input x (B, I)."""
     out.weight[:] = ZERO
@@ -136,7 +129,7 @@ def backward_weights(gradient: Array, x: Array, out: Layer) -> None:
             out.bias[o] += gradient[r, o]
 
 
-@vectorized
+@reordering_kernel
 def backward_input(gradient: Array, layer: Layer, out: Array) -> None:
     """Write the derivative by the input x (B, I), from that by y (B, O)."""
     out[:] = ZERO
@@ -155,7 +148,7 @@ MEAN_DECAY = 0.9
 SQUARE_DECAY = 0.999
 
 
-@vectorized
+@reordering_kernel
 def adam_step(
     weights: Array, gradient: Array, adam: Adam, learning_rate: float, epsilon: float
 ) -> None:
@@ -175,7 +168,7 @@ def adam_step(
         weights[i] -= size * mean[i] / (np.sqrt(square[i]) * root + least)
 
 
-@vectorized
+@reordering_kernel
 def mix(target: Array, source: Array, share: float) -> None:
     """Move the target (P,) towards the source (P,) by a share of the way."""
     rate = np.float32(share)
@@ -183,7 +176,7 @@ def mix(target: Array, source: Array, share: float) -> None:
         target[i] += rate * (source[i] - target[i])
 
 
-@vectorized
+@reordering_kernel
 def shorten(vector: Array, longest: float) -> None:
     """Scale a vector down to length `longest` if it is longer."""
     length = np.sqrt(np.float64(dot(vector, vector)))

@@ -7,10 +7,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from risk_dqn_planner.compiled import reordering_kernel
 from sim_bridge.learning import compiled_network as network
 from sim_bridge.learning.compiled_network import Signals, empty_signals
 from sim_bridge.learning.config import LearnerConfig
-from sim_bridge.learning.dense import Adam, Array, adam_step, mix, shorten, vectorized
+from sim_bridge.learning.dense import Adam, Array, adam_step, mix, shorten
 from sim_bridge.learning.losses import double_q_target, weighted_loss, weighted_loss_slope
 from sim_bridge.learning.replay import Sample, Transitions
 
@@ -43,7 +44,7 @@ class Rates(NamedTuple):
     max_gradient_norm: float
 
 
-@vectorized
+@reordering_kernel
 def _update(
     weights: Weights, rates: Rates, batch: Transitions, importance: Array, work: Workspace
 ) -> float:
@@ -112,7 +113,7 @@ class Learner:
             learning_rate=config.rate(progress),
             adam_epsilon=config.adam_epsilon,
             target_rate=config.target_rate,
-            max_gradient_norm=config.max_gradient_norm,
+            max_gradient_norm=config.max_gradient_norm or math.inf,
         )
         loss = _update(self._weights, rates, sample.transitions, sample.weights, self._work)
         return self._work.errors, loss

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from risk_dqn_planner.decision import Action
+from risk_dqn_planner.policies.base import Action
 from sim_bridge.environment.interface import Environment, Outcome
 from sim_bridge.learning.config import TrainingConfig
 from sim_bridge.learning.learner import Learner

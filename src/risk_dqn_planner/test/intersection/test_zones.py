@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -43,9 +43,9 @@ def only_lane(model: IntersectionModel) -> IntersectingLane:
     return lane
 
 
-def arc(x: float, y: float, radius_m: float, degrees: Sequence[float]) -> list[Any]:
+def arc(x: float, y: float, radius_m: float, degrees: Iterable[float]) -> list[tuple[float, float]]:
     """Points about a centre at angles from east."""
-    angles = np.radians(degrees)
+    angles = np.radians(list(degrees))
     return [(x + radius_m * math.cos(a), y + radius_m * math.sin(a)) for a in angles]
 
 
@@ -190,8 +190,8 @@ def test_consecutive_lanelets_in_contact_are_one_lane_named_after_the_last(
     sketch: Sketches, tmp_path: Path
 ) -> None:
     drawn = northward(sketch())
-    for lane, start, end in ((4, -100, -15), (50, -15, 0.5), (51, 0.5, 15), (6, 15, 100)):
-        drawn.lane(lane, [(start, 0), (end, 0)])
+    for lane_id, start, end in ((4, -100, -15), (50, -15, 0.5), (51, 0.5, 15), (6, 15, 100)):
+        drawn.lane(lane_id, [(start, 0), (end, 0)])
     model = build_intersection(drawn.load(tmp_path), ROUTE)
     lane = only_lane(model)
     assert lane.lane_id == 51

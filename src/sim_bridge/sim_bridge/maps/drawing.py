@@ -16,9 +16,10 @@ import lanelet2
 from risk_dqn_planner.map.loader import Lanelet, LineString, MapOrigin
 
 Point = tuple[float, float]
-# lanelet2's Python objects carry no types.
+# lanelet2's Python objects carry no types, or incomplete ones.
 MapPoint = Any
 Rule = Any
+core: Any = lanelet2.core
 
 LANE_WIDTH_M = 3.5
 CURVE_POINTS = 24
@@ -113,7 +114,7 @@ class Drawing:
         """Put up a speed limit for lanelets."""
         text = f"{limit_mps * KMH_PER_MPS:.6g} km/h"
         attributes = lanelet2.core.AttributeMap({"sign_type": text})
-        signs = lanelet2.core.TrafficSignsWithType([], text)
+        signs = core.TrafficSignsWithType([], text)
         rule = lanelet2.core.SpeedLimit(next(self._rule_ids), attributes, signs)
         # The class alone says so in memory; in the file, the subtype does.
         rule.attributes["subtype"] = "speed_limit"

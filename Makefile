@@ -53,7 +53,8 @@ maps: ## draw the project's own maps again
 	@$(WITH_ROS) $(SIMULATION)/draw_maps $(ARGS)
 
 bench: ## run the benchmarks
-	@$(WITH_ROS) bash -c 'for script in benchmarks/*.py; do python "$$script" || exit; done'
+	@$(WITH_ROS) bash -c 'for script in src/*/benchmarks/bench_*.py; do \
+	  echo "== $$script"; python "$$script" $(ARGS) || exit; done'
 
 shell: ## open a shell in which the nodes run [ARGS="-c 'command'"]
 	@$(WITH_ROS) bash --rcfile tools/shell.bashrc $(ARGS)

@@ -139,6 +139,12 @@ def test_a_missing_compiler_is_named_before_anything_is_installed(machine: Machi
     assert machine.calls() == []
 
 
+def test_a_folder_that_colcon_cannot_build_in_is_refused(machine: Machine):
+    machine.root = machine.root.rename(machine.root.with_name("my repository"))
+
+    assert "move it to another path" in refused(machine.set_up())
+
+
 def test_a_requested_python_of_another_version_is_refused(machine: Machine):
     python = machine.install_python("old-python", version=[3, 9])
     machine.variables["PYTHON"] = str(python)

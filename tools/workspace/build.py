@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -53,7 +53,7 @@ class Build:
             and all(self._is_installed(package) for package in self._packages())
         )
 
-    def ensure(self, environ: dict[str, str]) -> None:
+    def ensure(self, environ: Mapping[str, str]) -> None:
         """Build the packages.
 
         Raises:
@@ -68,7 +68,9 @@ class Build:
                         shutil.rmtree(str(self.root / name))
             write_stamp(self._stamp, {**stamp, "running": True})
             command = in_ros_environment(self.root, self._colcon_command())
-            returncode = run_logged(command, self._log, environ, running, self.root)
+            # The user's own defaults may ask for another layout than the one relied upon here.
+            colcon_environ = {**environ, "COLCON_DEFAULTS_FILE": os.devnull}
+            returncode = run_logged(command, self._log, colcon_environ, running, self.root)
             write_stamp(self._stamp, {**stamp, "complete": returncode == 0})
             if returncode != 0:
                 raise SetupError(f"colcon could not build the ROS packages; see {self._log}.")
@@ -79,7 +81,7 @@ class Build:
         for package in self._packages():
             for folder, folders, names in os.walk(str(package)):
                 # Modules are found through a link to the package's directory of the same name.
-                skipped = {"__pycache__", "test", package.name}
+                skipped = {"__pycache__", "benchmarks", "test", package.name}
                 folders[:] = sorted(name for name in folders if name not in skipped)
                 yield from (Path(folder) / name for name in sorted(names) if name[0] != ".")
 

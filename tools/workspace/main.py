@@ -13,7 +13,7 @@ from pathlib import Path
 
 from workspace.activation import in_workspace, write_activation
 from workspace.build import Build
-from workspace.prerequisites import check_build_tools, check_machine
+from workspace.prerequisites import check_build_tools, check_location, check_machine
 from workspace.python_environment import PythonEnvironment
 from workspace.report import SetupError, say
 from workspace.ros import find_ros, ros_environment
@@ -44,6 +44,7 @@ def set_up(root: Path, with_build: bool) -> None:
     """
     environ = dict(os.environ)
     requested = environ.get("PYTHON", "")
+    check_location(root)
     ros = find_ros(environ, root)
     environment = PythonEnvironment(root, ros)
     with _alone(root):

@@ -72,6 +72,19 @@ def check_build_tools(ros: RosSource, environ: Mapping[str, str]) -> None:
         )
 
 
+def check_location(root: Path) -> None:
+    """Check that the tools below can work where the project lies.
+
+    Raises:
+        SetupError: they cannot.
+    """
+    if any(character.isspace() or character in ":;'\"$" for character in str(root)):
+        raise SetupError(
+            f"The path of this folder, {root}, has a space or a sign that colcon and pip do not "
+            "bear: move it to another path and run this again."
+        )
+
+
 def check_room(root: Path) -> None:
     """Check that a new environment fits on the disk.
 

@@ -59,10 +59,16 @@ class Sketch:
         return line
 
     def right_of_way(
-        self, rule_id: int, yielding: MapLanelet, line: MapLine, *, listed: bool
+        self,
+        rule_id: int,
+        yielding: MapLanelet,
+        priority: MapLanelet,
+        line: MapLine,
+        *,
+        listed: bool,
     ) -> None:
         """Let a lanelet give way at a line; the lanelet itself may or may not list the rule."""
-        rule = lanelet2.core.RightOfWay(rule_id, AttributeMap({}), [], [yielding], line)
+        rule = lanelet2.core.RightOfWay(rule_id, AttributeMap({}), [priority], [yielding], line)
         if listed:
             yielding.addRegulatoryElement(rule)
         self.lanelet_map.add(rule)

@@ -15,6 +15,11 @@ def now_ns(node: Node) -> int:
     return int(node.get_clock().now().nanoseconds)
 
 
+def is_simulated(node: Node) -> bool:
+    """Tell whether the node's time comes from /clock."""
+    return bool(node.get_parameter("use_sim_time").value)
+
+
 def on_clock_back(node: Node, react: Callable[[], None]) -> JumpHandle:
     """Call `react` whenever the node's clock has jumped back, as it does when a bag restarts.
 

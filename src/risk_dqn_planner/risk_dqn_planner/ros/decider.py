@@ -77,6 +77,10 @@ class Decider:
         """Take the newest report."""
         self._report = report
 
+    def has_reached(self, stamp_ns: int) -> bool:
+        """Tell whether the newest report is of this time or later."""
+        return self._report is not None and self._report.stamp_ns >= stamp_ns
+
     def forget(self) -> None:
         """Start the policy's history anew, for instance because the clock went back."""
         self._decided = None

@@ -84,6 +84,21 @@ class EgoParameters:
 
 
 @dataclass(frozen=True)
+class ClockParameters:
+    """What simulated time changes: it may stand still and wait for the planner."""
+
+    sim_time_patience_s: float = field(
+        default=0.2,
+        metadata={
+            "description": "With simulated time, messages of the present moment are waited for "
+            "this long in real time, so that a busy computer decides the same [s]",
+            "minimum": 0.0,
+            "maximum": 10.0,
+        },
+    )
+
+
+@dataclass(frozen=True)
 class PolicyParameters:
     """Which policy decides how often."""
 

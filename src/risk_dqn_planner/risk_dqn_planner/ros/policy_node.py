@@ -11,11 +11,11 @@ from risk_dqn_planner.errors import InputError, PolicyError
 from risk_dqn_planner.policies.base import Policy
 from risk_dqn_planner.policies.loading import load_policy
 from risk_dqn_planner.ros import conversions, markers
-from risk_dqn_planner.ros.clock import now_ns, on_clock_back, steady_timer
+from risk_dqn_planner.ros.clock import is_simulated, now_ns, on_clock_back, steady_timer
 from risk_dqn_planner.ros.decider import Choice, Decider, DeciderConfig, UnusablePolicy
 from risk_dqn_planner.ros.diagnostics import ERROR, OK, Diagnostics
 from risk_dqn_planner.ros.main import run
-from risk_dqn_planner.ros.parameters import PolicyParameters, declare
+from risk_dqn_planner.ros.parameters import ClockParameters, PolicyParameters, declare
 from risk_dqn_planner.ros.qos import NEWEST
 from risk_dqn_planner.situation.report import SituationReport, Status
 from risk_dqn_planner.situation.warm_up import example_situation
@@ -33,13 +33,18 @@ class PolicyNode(Node):
         self._policy = self._load()
         self._decider = Decider(self._policy, explain, config)
         self._reason: Reason | None = None
+        self._due_ns: int | None = None  # time of a decision that waits for its situation
+        patience_s = declare(self, ClockParameters).sim_time_patience_s
+        self._patient = is_simulated(self) and patience_s > 0.0
+        self._patience = steady_timer(self, patience_s, self._decide_now)
+        self._patience.cancel()
         self._publisher = self.create_publisher(Decision, "~/output/decision", NEWEST)
         self._marker_publisher = self.create_publisher(MarkerArray, "~/debug/markers", NEWEST)
         self._diagnostics = Diagnostics(self, "planner")
         self._clock_back = on_clock_back(self, self._decider.forget)
         self.create_subscription(Situation, "~/input/situation", self._on_situation, NEWEST)
         # On the node's clock: with simulated time, decisions fall on multiples of the period.
-        self.create_timer(1.0 / self._settings.rate_hz, self._decide)
+        self.create_timer(1.0 / self._settings.rate_hz, self._on_tick)
         steady_timer(self, DIAGNOSTICS_PERIOD_S, self._diagnostics.publish)
         self.get_logger().info(f"ready with policy {self._policy.name}")
 
@@ -66,9 +71,29 @@ class PolicyNode(Node):
             stamp_ns = conversions.to_ns(message.header.stamp)
             report = SituationReport(stamp_ns, Status.INVALID_INPUT, str(error))
         self._decider.receive(report)
+        if self._due_ns is not None and self._decider.has_reached(self._due_ns):
+            self._decide_now()
 
-    def _decide(self) -> None:
-        stamp_ns = now_ns(self)
+    def _on_tick(self) -> None:
+        """Decide; in simulated time only once the situation of this very moment is there.
+
+        Clock and situation are different topics, and either may win the race.
+        """
+        self._decide_now()
+        self._due_ns = now_ns(self)
+        if self._patient and not self._decider.has_reached(self._due_ns):
+            self._patience.reset()
+        else:
+            self._decide_now()
+
+    def _decide_now(self) -> None:
+        """Take the decision that is due, if one is."""
+        self._patience.cancel()
+        if self._due_ns is not None:
+            self._decide(self._due_ns)
+        self._due_ns = None
+
+    def _decide(self, stamp_ns: int) -> None:
         choice = self._decider.decide(stamp_ns)
         message = conversions.decision_to_message(
             choice.decision, stamp_ns, choice.situation_stamp_ns

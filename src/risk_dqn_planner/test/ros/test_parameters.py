@@ -1,0 +1,156 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Parameters are the fields of the configuration, with the same defaults and in the same bounds."""
+
+import dataclasses
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import pytest
+import rclpy
+import yaml
+from rclpy.context import Context
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+from risk_dqn_planner.errors import ConfigurationError
+from risk_dqn_planner.intersection.config import IntersectionConfig
+from risk_dqn_planner.ros.decider import DeciderConfig
+from risk_dqn_planner.ros.parameters import (
+    ClockParameters,
+    EgoParameters,
+    MapParameters,
+    PolicyParameters,
+    declare,
+)
+from risk_dqn_planner.ros.synchroniser import SynchroniserConfig
+from risk_dqn_planner.situation.config import SituationConfig
+from risk_dqn_planner.vehicle import VehicleDimensions
+
+MakeNode = Callable[..., Node]
+
+PLANNER_YAML = Path(__file__).resolve().parents[2] / "config" / "planner.yaml"
+
+
+@dataclass(frozen=True)
+class Example:
+    speed_mps: float = field(
+        default=1.0, metadata={"description": "How fast", "minimum": 0.0, "maximum": 5.0}
+    )
+    count: int = 3
+    name: str = "a"
+    on: bool = True
+    size: VehicleDimensions = field(default_factory=VehicleDimensions)
+    other: tuple[int, ...] = (1, 2)
+
+
+@pytest.fixture(scope="module")
+def context() -> Iterator[Context]:
+    context = Context()
+    rclpy.init(context=context)
+    yield context
+    context.try_shutdown()
+
+
+@pytest.fixture
+def make_node(context: Context) -> Iterator[MakeNode]:
+    made: list[Node] = []
+
+    def make(**overrides: object) -> Node:
+        # Dots cannot be written in keywords.
+        given = [Parameter(name.replace("__", "."), value=v) for name, v in overrides.items()]
+        node = Node("example", context=context, parameter_overrides=given)
+        made.append(node)
+        return node
+
+    yield make
+    for node in made:
+        node.destroy_node()
+
+
+def test_without_overrides_the_defaults_of_the_dataclass_hold(make_node: MakeNode) -> None:
+    node = make_node()
+    assert declare(node, Example) == Example()
+    assert node.get_parameter("speed_mps").value == 1.0
+    assert not node.has_parameter("other")
+
+
+def test_overrides_reach_the_dataclass_nested_ones_by_prefix(make_node: MakeNode) -> None:
+    node = make_node(x__speed_mps=2.5, x__size__length_m=5.0, x__on=False)
+    expected = Example(speed_mps=2.5, size=VehicleDimensions(length_m=5.0), on=False)
+    assert declare(node, Example, prefix="x.") == expected
+
+
+def test_given_values_are_no_parameters(make_node: MakeNode) -> None:
+    node = make_node(count=9)
+    assert declare(node, Example, given={"count": 5}).count == 5
+    assert not node.has_parameter("count")
+
+
+def test_parameters_are_described_bounded_and_fixed(make_node: MakeNode) -> None:
+    node = make_node()
+    declare(node, Example)
+    speed = node.describe_parameter("speed_mps")
+    bounds = speed.floating_point_range[0]
+    assert speed.description == "How fast"
+    assert speed.read_only
+    assert (bounds.from_value, bounds.to_value) == (0.0, 5.0)
+    assert node.describe_parameter("size.length_m").description == "Size length [m]"
+    assert not node.set_parameters([Parameter("speed_mps", value=2.0)])[0].successful
+
+
+@pytest.mark.parametrize(
+    ("overrides", "words"),
+    [
+        ({"speed_mps": 9.0}, "speed_mps: .*expected a number such as 2.0 from 0 to 5"),
+        ({"speed_mps": 2}, "speed_mps: .*expected a number such as 2.0"),
+        ({"on": "yes"}, "on: .*expected true or false"),
+        ({"size__width_m": -1.0}, r"VehicleDimensions.width_m is -1.0"),
+    ],
+)
+def test_a_bad_value_is_refused_in_one_line(
+    make_node: MakeNode, overrides: dict[str, object], words: str
+) -> None:
+    with pytest.raises(ConfigurationError, match=words) as caught:
+        declare(make_node(**overrides), Example)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_map_without_a_file_or_an_origin_is_refused_by_name() -> None:
+    with pytest.raises(ConfigurationError, match="parameter map_file is not set"):
+        MapParameters().load()
+    with pytest.raises(ConfigurationError, match="parameter map_origin_longitude is not set"):
+        MapParameters(map_file="x.osm", map_origin_latitude=49.0).load()
+
+
+def flat(values: dict[str, Any], prefix: str = "") -> dict[str, Any]:
+    result: dict[str, Any] = {}
+    for name, value in values.items():
+        result |= (
+            flat(value, f"{prefix}{name}.") if isinstance(value, dict) else {prefix + name: value}
+        )
+    return result
+
+
+def defaults(*configs: object) -> dict[str, Any]:
+    result: dict[str, Any] = {}
+    for config in configs:
+        result |= flat(dataclasses.asdict(config))  # type: ignore[call-overload]
+    return result
+
+
+def test_the_parameter_file_holds_all_parameters_with_their_defaults() -> None:
+    document = yaml.safe_load(PLANNER_YAML.read_text("utf-8"))
+    found = {node: flat(entry["ros__parameters"]) for node, entry in document.items()}
+    intersection = dataclasses.asdict(IntersectionConfig())
+    del intersection["sensor_range_m"]  # the situation's own
+    situation = defaults(
+        MapParameters(), EgoParameters(), SynchroniserConfig(), ClockParameters(), SituationConfig()
+    ) | flat({"intersection": intersection})
+    policy = defaults(PolicyParameters(), DeciderConfig(), ClockParameters())
+    for argument in ("map_file", "map_origin_latitude", "map_origin_longitude", "map_projector"):
+        del situation[argument]  # arguments of the launch file
+    del policy["policy"]
+    assert found["/**/situation"] == pytest.approx(situation, abs=1e-4)
+    assert found["/**/policy"] == pytest.approx(policy)

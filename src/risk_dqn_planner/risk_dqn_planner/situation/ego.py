@@ -21,16 +21,17 @@ def ego_progress(model: IntersectionModel, ego: EgoPose, config: SituationConfig
     s, lateral, heading = path.project(ego.x_m, ego.y_m, ego.heading_rad, limit)
     # With its heading ignored the ego may well be on the path: then it only faces the wrong way.
     nearest = path.project(ego.x_m, ego.y_m)
-    if abs(nearest.lateral_m) > config.max_ego_offset_m:
+    # Written so that not-a-number, which huge coordinates lead to, is off the route.
+    if not abs(nearest.lateral_m) <= config.max_ego_offset_m:
         raise EgoPoseError(
-            f"the ego is {abs(nearest.lateral_m):.1f} m beside its route, "
+            f"the ego is {_metres(abs(nearest.lateral_m))} beside its route, "
             f"expected at most {config.max_ego_offset_m:g} m"
         )
     if nearest.s < 0.0:
-        raise EgoPoseError(f"the ego is {-nearest.s:.1f} m before the start of its route")
+        raise EgoPoseError(f"the ego is {_metres(-nearest.s)} before the start of its route")
     if nearest.s > path.length_m:
         beyond = nearest.s - path.length_m
-        raise EgoPoseError(f"the ego is {beyond:.1f} m beyond the end of its route")
+        raise EgoPoseError(f"the ego is {_metres(beyond)} beyond the end of its route")
     if abs(lateral) > config.max_ego_offset_m:
         heading = nearest.heading_rad
     turned = turned_by_kernel(ego.heading_rad, heading)
@@ -40,3 +41,7 @@ def ego_progress(model: IntersectionModel, ego: EgoPose, config: SituationConfig
             f"expected at most {math.degrees(limit):.0f}"
         )
     return s
+
+
+def _metres(length_m: float) -> str:
+    return f"{length_m:.1f} m" if length_m < 1e6 else f"{length_m:.1e} m"

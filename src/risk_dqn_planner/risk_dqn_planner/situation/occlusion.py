@@ -131,8 +131,9 @@ def hidden_distances_kernel(
 ) -> Floats:
     """Return d_o (M,): each zone's centre to the nearest place where a vehicle may hide [m].
 
-    The least over a lane's upstream branches, at most `sensor_range` and the branch's start;
-    minus half the zone's length where not even the zone's exit is seen.
+    The least over a lane's upstream branches, at most `sensor_range`, also where a branch that is
+    seen to its start is shorter: the map knows of no lane that leads into it. Minus half the
+    zone's length where not even the zone's exit is seen.
     """
     nearest = np.full(lanes, math.inf)
     for p in range(table.lane.shape[0]):
@@ -143,5 +144,6 @@ def hidden_distances_kernel(
         # What is further than the nearest place found so far cannot change the result.
         end = min(max(center - min(sensor_range, nearest[lane]), 0.0), start)
         hidden = first_hidden_kernel(table.xy[begin:stop], s, start, end, polygon)
-        nearest[lane] = min(nearest[lane], center - hidden)
+        seen = sensor_range if hidden <= end else center - hidden
+        nearest[lane] = min(nearest[lane], seen)
     return nearest

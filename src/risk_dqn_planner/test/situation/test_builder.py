@@ -181,3 +181,27 @@ def test_moving_or_turning_the_whole_map_changes_nothing(
     assert expected.lane_hidden_distance_m == pytest.approx(np.array([[seen]]))
     for name, before, after in zip(expected._fields, expected, got, strict=True):
         assert after == pytest.approx(before, abs=1e-6), name
+
+
+ANY_FLOAT = st.floats(allow_nan=True, allow_infinity=True)
+NEAR = st.floats(-80.0, 80.0)
+
+
+@settings(max_examples=300, deadline=None)
+@given(
+    ego=st.tuples(ANY_FLOAT | NEAR, ANY_FLOAT | NEAR, ANY_FLOAT | st.just(0.0), ANY_FLOAT | NEAR),
+    rows=st.lists(st.tuples(*[ANY_FLOAT | NEAR] * 4), max_size=4),
+    corners=st.lists(st.tuples(ANY_FLOAT | NEAR, ANY_FLOAT | NEAR), max_size=6),
+)
+def test_whatever_comes_in_the_situation_is_finite_or_a_named_error_says_why(
+    ego: tuple[float, float, float, float],
+    rows: list[tuple[float, ...]],
+    corners: list[tuple[float, float]],
+) -> None:
+    area = np.array(corners, dtype=np.float64).reshape(-1, 2)
+    try:
+        situations = build(rows, ego=EgoPose(*ego), area=area)
+    except (InputError, EgoPoseError):
+        return
+    for name, values in zip(situations._fields, situations, strict=True):
+        assert np.isfinite(values).all(), name

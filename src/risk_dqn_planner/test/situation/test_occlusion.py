@@ -43,8 +43,8 @@ def test_a_lane_seen_as_a_whole_reaches_to_the_sensor_range() -> None:
     assert hidden(square(100.0), sensor_range=40.0) == pytest.approx(40.0)
 
 
-def test_a_lane_seen_as_a_whole_reaches_no_further_than_it_goes_back() -> None:
-    assert hidden(square(100.0), sensor_range=90.0) == pytest.approx(70.0)
+def test_a_lane_seen_to_where_the_map_ends_hides_nothing_within_range() -> None:
+    assert hidden(square(100.0), sensor_range=90.0) == pytest.approx(90.0)
 
 
 def test_a_hidden_zone_leaves_nothing_free() -> None:

@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: Apache-2.0
+"""B simulated episodes as a learning problem: perceive, encode, reward, begin the next episode."""
+
+import copy
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from risk_dqn_planner.risk.config import RiskConfig
+from risk_dqn_planner.state.history import StateEncoder
+from sim_bridge.environment.interface import EnvironmentStep, Outcome, States
+from sim_bridge.environment.rewards import RewardConfig, rewards
+from sim_bridge.environment.seeds import Seeds, training_seeds
+from sim_bridge.simulation import Simulation, StepResult
+
+
+def outcomes(result: StepResult) -> NDArray[np.int64]:
+    """Return the Outcome (B,) of the episodes that this step ended, RUNNING for all others."""
+    outcome = np.full(len(result.ran), Outcome.RUNNING, dtype=np.int64)
+    outcome[result.reached_goal] = Outcome.SUCCESS
+    outcome[result.collided] = Outcome.COLLISION
+    outcome[result.timed_out] = Outcome.TIMEOUT
+    outcome[~result.ran] = Outcome.RUNNING
+    return outcome
+
+
+class BatchEnvironment:
+    """The simulator for training; implements `interface.Environment`.
+
+    Episode seeds follow from (run_seed, index in the batch, count of episodes) and lie in the
+    training range.
+    """
+
+    def __init__(
+        self,
+        simulation: Simulation,
+        encoder: StateEncoder,
+        reward: RewardConfig,
+        risk: RiskConfig,
+        run_seed: int,
+    ) -> None:
+        self._simulation = simulation
+        self._encoder = encoder
+        self._reward = reward
+        self._risk = risk
+        self._run_seed = run_seed
+        self._begun = np.zeros(self.batch, dtype=np.int64)
+        self._ended = np.zeros(self.batch, dtype=np.bool_)
+        self._situations = simulation.situations()
+        everywhere = np.ones(self.batch, dtype=np.bool_)
+        self._states = encoder.encode(self._situations, everywhere)
+
+    @property
+    def batch(self) -> int:
+        """B."""
+        return self._simulation.batch
+
+    @property
+    def features(self) -> int:
+        """How many numbers a state has."""
+        return int(self._states[0].size)
+
+    def reset(self, seeds: Seeds | None = None) -> States:
+        """Begin the next episode of each environment, or those of `seeds` (B,).
+
+        Returns the flat states (B, F).
+        """
+        everywhere = np.ones(self.batch, dtype=np.bool_)
+        self._begin(everywhere, seeds)
+        self._ended[:] = False
+        return self._perceive(everywhere)
+
+    def step(self, actions: NDArray[np.int64]) -> EnvironmentStep:
+        """Take one action (B,) in each environment, or begin the next episode where one ended."""
+        begin = self._ended
+        result = self._simulation.step(actions)
+        outcome = outcomes(result)
+        if begin.any():
+            self._begin(begin)
+        states = self._perceive(begin)
+        reward = rewards(
+            self._reward,
+            self._risk,
+            self._situations,
+            outcome == Outcome.COLLISION,
+            outcome == Outcome.SUCCESS,
+        )
+        self._ended = outcome != Outcome.RUNNING
+        terminated = self._ended & (outcome != Outcome.TIMEOUT)
+        return EnvironmentStep(
+            taken=~begin,
+            reward=reward,
+            discount=1.0 - terminated.astype(np.float32),
+            outcome=outcome,
+            states=states,
+        )
+
+    def _begin(self, which: NDArray[np.bool_], seeds: Seeds | None = None) -> None:
+        if seeds is None:
+            seeds = training_seeds(self._run_seed, self._begun)
+        self._simulation.reset(seeds, which)
+        self._begun += which
+
+    def _perceive(self, restart: NDArray[np.bool_]) -> States:
+        self._simulation.situations(out=self._situations)
+        self._encoder.encode(self._situations, restart, out=self._states)
+        return self._states.reshape(self.batch, -1)
+
+    def state_dict(self) -> dict[str, Any]:
+        """Return everything that `load_state_dict` needs to go on identically."""
+        return {
+            "simulation": copy.deepcopy(self._simulation.state),
+            "encoder": copy.deepcopy(self._encoder),
+            "begun": self._begun.copy(),
+            "ended": self._ended.copy(),
+        }
+
+    def load_state_dict(self, state: dict[str, Any]) -> None:
+        """Take over an interrupted run of the same scenario, map and batch."""
+        self._simulation.state = copy.deepcopy(state["simulation"])
+        self._encoder = copy.deepcopy(state["encoder"])
+        self._begun[:] = state["begun"]
+        self._ended = state["ended"].copy()

@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Where episodes take place: an intersection of an own map or of any Lanelet2 file."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from risk_dqn_planner.errors import ConfigurationError
+from risk_dqn_planner.intersection.builder import build_intersection
+from risk_dqn_planner.intersection.model import IntersectionModel
+from risk_dqn_planner.map.loader import MapOrigin, load_map
+from sim_bridge.maps import shipped_map
+from sim_bridge.scenario import Scenario
+from sim_bridge.simulation import Simulation
+
+
+@dataclass(frozen=True)
+class Place:
+    """An intersection with the outlines (K, 2) of all lanelets, where no obstacle may stand."""
+
+    map_name: str
+    model: IntersectionModel
+    outlines: tuple[NDArray[np.float64], ...]
+
+    def simulation(self, scenario: Scenario, batch: int) -> Simulation:
+        """Lay out a scenario here for a batch of episodes."""
+        return Simulation(self.model, scenario, batch, keep_out=self.outlines)
+
+
+def load_place(
+    map_name: str,
+    route: tuple[int, ...] | None = None,
+    origin: MapOrigin | None = None,
+    projector: str = "utm",
+) -> Place:
+    """Load an own map by its name, or an .osm file, which needs a route and an origin.
+
+    Raises:
+        ConfigurationError: a file without route. MapError, RouteError: neither can be used.
+    """
+    if map_name.endswith(".osm"):
+        path = Path(map_name)
+    else:
+        own = shipped_map(map_name)
+        path, route, origin = own.path, route or own.route, origin or own.origin
+    if route is None:
+        raise ConfigurationError(f"{map_name} is no own map, so its route must be given")
+    road_map = load_map(path, origin, projector)
+    outlines = tuple(
+        np.array([(point.x, point.y) for point in lanelet.polygon2d()])
+        for lanelet in road_map.lanelet_map.laneletLayer
+    )
+    return Place(map_name, build_intersection(road_map, route), outlines)

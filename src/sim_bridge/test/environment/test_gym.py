@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: Apache-2.0
+import warnings
+
+import numpy as np
+import pytest
+
+from risk_dqn_planner.errors import ConfigurationError, ScenarioError
+from sim_bridge.environment.interface import Outcome
+
+gymnasium = pytest.importorskip("gymnasium")
+
+from sim_bridge.environment.registration import ID, register  # noqa: E402 (only if installed)
+
+register()
+
+
+def test_passes_gymnasiums_own_check() -> None:
+    from gymnasium.utils.env_checker import check_env  # noqa: PLC0415
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        check_env(gymnasium.make(ID).unwrapped, skip_render_check=True)
+
+
+def test_passes_the_check_of_stable_baselines3() -> None:
+    checker = pytest.importorskip("stable_baselines3.common.env_checker")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        checker.check_env(gymnasium.make(ID).unwrapped)
+
+
+def test_a_seed_names_the_same_episode_alone_and_in_a_vector() -> None:
+    one = gymnasium.make(ID)
+    many = gymnasium.make_vec(ID, num_envs=3)
+    states, _ = many.reset(seed=40)
+    for k in range(3):
+        alone, _ = one.reset(seed=40 + k)
+        np.testing.assert_array_equal(states[k], alone)
+
+
+def test_time_limit_truncates_and_goal_or_collision_terminates() -> None:
+    many = gymnasium.make_vec(ID, num_envs=16, reward="collision")
+    many.reset(seed=0)
+    for _ in range(60):
+        _, _, terminated, truncated, info = many.step(np.full(16, 2))
+        assert not truncated.any()
+        np.testing.assert_array_equal(terminated, info["outcome"] != Outcome.RUNNING)
+    one = gymnasium.make(ID)
+    one.reset(seed=0)
+    for _ in range(119):
+        assert not any(one.step(0)[2:4])
+    *_, terminated, truncated, info = one.step(0)
+    assert (terminated, truncated, info) == (False, True, {"outcome": "timeout"})
+
+
+def test_unknown_names_are_refused() -> None:
+    with pytest.raises(ScenarioError, match="no scenario 'fog'"):
+        gymnasium.make(ID, scenario="fog")
+    with pytest.raises(ConfigurationError, match="no reward 'comfort'"):
+        gymnasium.make(ID, reward="comfort")

@@ -1,0 +1,151 @@
+# SPDX-License-Identifier: Apache-2.0
+import json
+from dataclasses import replace
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from risk_dqn_planner.errors import ConfigurationError
+from risk_dqn_planner.policies.learned import LearnedPolicy
+from risk_dqn_planner.policies.policy_file import load_policy_file
+from sim_bridge.environment.episodes import drive
+from sim_bridge.environment.place import Place, load_place
+from sim_bridge.environment.seeds import VALIDATION_SEEDS, fixed_seeds
+from sim_bridge.learning.checkpoint import RunFolder
+from sim_bridge.learning.config import EvaluationConfig, LearnerConfig, ReplayConfig, TrainingConfig
+from sim_bridge.learning.export import initial_weights
+from sim_bridge.learning.session import Run, Score, Session
+from sim_bridge.learning.train import main
+from sim_bridge.scenario import load_scenario
+
+TINY = Run(
+    config=TrainingConfig(
+        preset="tiny",
+        steps=600,
+        environments=4,
+        batch_size=8,
+        warmup_steps=50,
+        n_step=2,
+        replay=ReplayConfig(capacity=300),
+        learner=LearnerConfig(learning_rate=1e-3),
+        evaluation=EvaluationConfig(
+            every_episodes=4, episodes=3, validation_every=2, validation_episodes=5
+        ),
+    ),
+    reward="risk_with_occlusions",
+    seed=3,
+    map_name="four_way",
+    scenario="base",
+)
+
+
+@lru_cache
+def place() -> Place:
+    return load_place("four_way")
+
+
+def session(run: Run = TINY) -> Session:
+    return Session(run, place(), initial_weights(run.seed))
+
+
+def test_interrupted_run_resumes_to_the_bit_identical_result(tmp_path: Path) -> None:
+    whole = session()
+    list(whole.run())
+    begun = session()
+    going = begun.run()
+    next(going)
+    next(going)
+    RunFolder(tmp_path, TINY).save(begun)
+    resumed = session()
+    assert RunFolder(tmp_path, TINY).resume(resumed)
+    list(resumed.run())
+    np.testing.assert_array_equal(resumed.last_weights, whole.last_weights)
+    assert resumed.records == whole.records
+    assert resumed.best is not None
+    assert whole.best is not None
+    np.testing.assert_array_equal(resumed.best.weights, whole.best.weights)
+
+
+def test_another_seed_gives_another_result() -> None:
+    first, second = session(), session(replace(TINY, seed=4))
+    list(first.run())
+    list(second.run())
+    assert not np.array_equal(first.last_weights, second.last_weights)
+
+
+def test_validation_comes_every_second_report_and_at_the_end() -> None:
+    one = session()
+    list(one.run())
+    *former, last = one.records
+    assert [record.validation is not None for record in former] == [
+        k % 2 == 1 for k in range(len(former))
+    ]
+    assert last.validation is not None
+    assert last.steps >= TINY.config.steps
+
+
+def test_best_is_that_of_highest_rank() -> None:
+    one = session()
+    list(one.run())
+    scores = [record.validation for record in one.records if record.validation]
+    assert one.best is not None
+    assert one.best.score.rank == max(score.rank for score in scores)
+
+
+def test_a_collision_undoes_a_success_and_speed_breaks_ties() -> None:
+    careful = Score(100, success=0.90, collision=0.0, timeout=0.10, mean_speed_mps=2.0)
+    daring = Score(100, success=0.95, collision=0.05, timeout=0.0, mean_speed_mps=3.0)
+    quick = replace(daring, success=0.97, collision=0.03, mean_speed_mps=2.5)
+    assert max((careful, daring), key=lambda s: s.rank) is daring
+    assert max((careful, daring, quick), key=lambda s: s.rank) is quick
+
+
+def test_exported_policy_drives_as_validation_said(tmp_path: Path) -> None:
+    one = session()
+    list(one.run())
+    file = load_policy_file(RunFolder(tmp_path, TINY).finish(one, "tiny"))
+    policy = LearnedPolicy(file.module, file.name, file.sha256)
+    simulation = place().simulation(load_scenario("base"), 5)
+    driven = drive(simulation, policy, fixed_seeds(VALIDATION_SEEDS, 5))
+    assert one.best is not None
+    assert Score.of(driven) == one.best.score
+    result = json.loads((tmp_path / "result.json").read_text())
+    assert result["sha256"] == file.sha256
+    assert file.contract["training"]["run"]["seed"] == TINY.seed
+    assert file.contract["maps"] == ["four_way"]
+
+
+def test_a_folder_of_another_run_is_refused(tmp_path: Path) -> None:
+    one = session()
+    next(one.run())
+    RunFolder(tmp_path, TINY).save(one)
+    other = replace(TINY, seed=9)
+    with pytest.raises(ConfigurationError, match="holds another training run"):
+        RunFolder(tmp_path, other).resume(session(other))
+
+
+def test_a_damaged_checkpoint_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "checkpoint.pickle").write_bytes(b"no pickle")
+    with pytest.raises(ConfigurationError, match="cannot be read"):
+        RunFolder(tmp_path, TINY).resume(session())
+
+
+def test_command_trains_once_and_says_so(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = ["--reward", "collision", "--steps", "1200", "--out", str(tmp_path)]
+    assert main(arguments) == 0
+    assert {"policy.pt", "history.json", "result.json"} <= {p.name for p in tmp_path.iterdir()}
+    assert not (tmp_path / "checkpoint.pickle").exists()
+    capsys.readouterr()
+    assert main(arguments) == 0
+    assert "is trained already" in " ".join(capsys.readouterr().out.split())
+
+
+def test_command_names_what_it_cannot_use(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["--reward", "comfort"]) == 2
+    assert "there is no reward 'comfort'" in capsys.readouterr().err
+    assert main(["--preset", "fast"]) == 2
+    assert "there is no preset 'fast'" in capsys.readouterr().err

@@ -140,7 +140,7 @@ def first_hidden(
 
     xy (P, V, 2) and distance (P, V): `points` points from the zone's exit upstream, with their
     distance to the zone's centre; `count` shadows b of (B, O, 4, 3). A path that is seen to its
-    end gives its end.
+    end gives the range, also where it is shorter (as risk_dqn_planner.situation.occlusion).
     """
     for k in range(points - 1):
         ax, ay = xy[p, k, 0], xy[p, k, 1]
@@ -150,4 +150,4 @@ def first_hidden(
             hidden = min(hidden, shadow_entry(shadows, b, o, ax, ay, dx, dy))
         if hidden <= 1.0:
             return float(distance[p, k] + hidden * (distance[p, k + 1] - distance[p, k]))
-    return float(distance[p, points - 1])
+    return range_m

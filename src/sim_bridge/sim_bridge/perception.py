@@ -135,7 +135,7 @@ def perceive_vehicles(
 ) -> None:
     """Fill in the seen vehicles, packed at the front, in the order of their places."""
     driving, path, s_m = vehicles.driving, vehicles.path, vehicles.s_m
-    first, low_m, high_m = matches.first, matches.low_m, matches.high_m
+    low_m, high_m = matches.low_m, matches.high_m
     mask, distance_m = situations.vehicle_mask, situations.vehicle_distance_m
     for b in range(len(view.x_m)):
         used = 0
@@ -162,7 +162,9 @@ def perceive_vehicles(
                 episodes.tick[b],
                 vehicles.id[b, i],
             )
-            for m in range(first[p], first[p + 1]):
+            cell = min(max(int(s), 0), matches.first.shape[1] - 2)
+            for k in range(matches.first[p, cell], matches.first[p, cell + 1]):
+                m = matches.piece[k]
                 along = s - low_m[m]
                 if along < 0.0 or s >= high_m[m]:
                     continue

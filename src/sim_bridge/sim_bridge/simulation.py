@@ -19,6 +19,7 @@ from risk_dqn_planner.situation.situations import (
     empty_situations,
 )
 from risk_dqn_planner.vehicle import EgoLimits
+from sim_bridge.matches import most_lanes_at_once
 from sim_bridge.path_geometry import table_pose
 from sim_bridge.perception import VehiclePoses, empty_view, perceive, reveal
 from sim_bridge.population import start_episodes
@@ -177,14 +178,8 @@ class Simulation:
         return result
 
     def _empty_situations(self) -> Situations:
-        pieces = self.world.matches
-        # A vehicle is on no more lanes at a time than its path is matched to anywhere.
-        most = max(
-            len(set(pieces.lane[a:b]))
-            for a, b in zip(pieces.first[:-1], pieces.first[1:], strict=True)
-        )
-        places = max(self.state.vehicles.driving.shape[1] * most, 1)
-        result = empty_situations(self.batch, places, len(self.model.lanes))
+        places = self.state.vehicles.driving.shape[1] * most_lanes_at_once(self.world.matches)
+        result = empty_situations(self.batch, max(places, 1), len(self.model.lanes))
         lanes = self.world.lanes
         result.lane_mask[:] = True
         result.lane_id[:] = lanes.id

@@ -2,7 +2,7 @@
 """Small intersections made by hand, whose numbers can be checked with a pencil."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import pytest
@@ -92,19 +92,24 @@ def base() -> Scenario:
     return load_scenario("base")
 
 
-def with_vehicles(scenario: Scenario, count: int, **traffic: object) -> Scenario:
-    """The scenario with exactly so many vehicles."""
+def exactly(scenario: Scenario, count: int, **traffic: object) -> Scenario:
+    """The scenario with so many vehicles, and other fields of its traffic."""
     fields = {"vehicles": Interval(count, count), **traffic}
     return replace(scenario, traffic=replace(scenario.traffic, **fields))
 
 
 @pytest.fixture(scope="session")
+def with_vehicles() -> Callable[..., Scenario]:
+    return exactly
+
+
+@pytest.fixture(scope="session")
 def empty_road(base: Scenario) -> Scenario:
     """Base without vehicles and without obstacles."""
-    return replace(with_vehicles(base, 0), obstacles=Obstacles(per_side=0))
+    return replace(exactly(base, 0), obstacles=Obstacles(per_side=0))
 
 
 @pytest.fixture(scope="session")
 def busy(base: Scenario) -> Scenario:
     """Base with exactly six vehicles."""
-    return with_vehicles(base, 6)
+    return exactly(base, 6)

@@ -254,15 +254,20 @@ def test_nothing_is_repeated_when_nothing_changed(machine: Machine):
     assert machine.calls() == []
 
 
-def test_a_changed_requirement_is_installed_into_the_same_environment(machine: Machine):
-    machine.set_up("--no-build")
+@pytest.mark.parametrize(
+    ("name", "calls"), [("development.txt", ["pip"]), ("python.txt", ["pip", "colcon"])]
+)
+def test_a_changed_requirement_is_installed_into_the_same_environment(
+    machine: Machine, name: str, calls: list[str]
+):
+    machine.set_up()
     machine.calls()
-    with (machine.root / "requirements" / "development.txt").open("a") as requirements:
+    with (machine.root / "requirements" / name).open("a") as requirements:
         requirements.write("tabulate==0.9.0\n")
 
-    machine.set_up("--no-build")
+    machine.set_up()
 
-    assert machine.calls() == ["pip"]
+    assert machine.calls() == calls
 
 
 def test_another_python_makes_the_environment_anew(machine: Machine):

@@ -16,7 +16,8 @@ from workspace.report import SetupError, run_logged, stage
 from workspace.ros import RosSource, ros_environment
 from workspace.stamps import digest, read_stamp, write_stamp, write_text
 
-WHEEL_REQUIREMENTS = ("ros-jazzy.txt", "python.txt", "development.txt")
+DEVELOPMENT = "development.txt"
+WHEEL_REQUIREMENTS = ("ros-jazzy.txt", "python.txt", DEVELOPMENT)
 WHEEL_CONSTRAINTS = "constraints.txt"
 INSTALLED_ROS_REQUIREMENTS = "system-ros.txt"
 
@@ -53,9 +54,12 @@ class PythonEnvironment:
         }
 
     def identity(self) -> dict[str, Any]:
-        """Return what the environment was made from; builds made with another are void."""
+        """Return what builds depend on: those made with another environment are void."""
         stamp = read_stamp(self._stamp)
-        return {name: stamp.get(name) for name in ("recipe", "executable")}
+        recipe = dict(stamp.get("recipe", {}))
+        files = recipe.get("requirements", {})
+        recipe["requirements"] = {name: files[name] for name in files if name != DEVELOPMENT}
+        return {"recipe": recipe, "executable": stamp.get("executable")}
 
     def is_current(self, requested: str, environ: Mapping[str, str]) -> bool:
         """Tell whether the environment is complete and as it would be made now."""

@@ -7,13 +7,13 @@ the corner of ego lane and intersecting lanes as its gaps allow: it is moved bac
 lane and away from it by the least sum of both.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from shapely.geometry import LineString, Polygon
+from shapely.geometry import LineString, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from risk_dqn_planner.errors import ScenarioError
@@ -23,11 +23,15 @@ from sim_bridge.scenario_fields import Obstacles
 
 LEFT, RIGHT = 0, 1
 _PLACEMENTS = 256
-_STEP_M = 0.5
+_COARSE_STEP_M = 2.0
+_FINE_STEPS_M = (1.0, 0.5, 0.25, 0.125, 0.0625, 0.03125)
 _MOST_MOVED_M = 40.0
 # Obstacles may reach this far beyond the start of the first conflict zone.
 _BEYOND_M = 3.0
 _ROUNDING_M = 1e-6
+# Roads matter within this radius of the first zone's centre, their outlines to this accuracy.
+_NEAR_M = 90.0
+_OUTLINE_M = 0.01
 
 
 class Catalogue(NamedTuple):
@@ -84,50 +88,81 @@ def _corridor(path: LanePath) -> BaseGeometry:
 
 def _roads(model: IntersectionModel, keep_out: Sequence[NDArray[np.float64]]) -> _Roads:
     crossing = [_corridor(path.path) for lane in model.lanes for path in lane.paths]
-    roads = _Roads(
+    first_zone = Point(model.ego_path.centerline.position(model.lanes[0].ego_zone_center_m))
+    near = first_zone.buffer(_NEAR_M)
+    whole = (
         _corridor(model.ego_path),
         shapely.union_all(crossing),
         shapely.union_all([Polygon(points).buffer(0.0) for points in keep_out]),
     )
+    roads = _Roads(*(road.intersection(near).simplify(_OUTLINE_M) for road in whole))
     for road in roads:
         shapely.prepare(road)
     return roads
+
+
+class _Drawn(NamedTuple):
+    """Sizes and gaps [m] of K rectangles, each (K,)."""
+
+    length: Floats
+    width: Floats
+    gap_ego: Floats
+    gap_cross: Floats
+
+
+def _draw(config: Obstacles, side: int, world_seed: int) -> _Drawn:
+    draw = np.random.default_rng((world_seed, side))
+    intervals = (config.length_m, config.width_m, config.gap_ego_m, config.gap_cross_m)
+    return _Drawn(*(draw.uniform(each.low, each.high, _PLACEMENTS) for each in intervals))
 
 
 def _placements(
     model: IntersectionModel, config: Obstacles, roads: _Roads, side: int, world_seed: int
 ) -> Floats:
     """Return the valid rectangles (K, 4, 2) of a side."""
-    draw = np.random.default_rng((world_seed, side))
-    length, width, gap_ego, gap_cross = (
-        draw.uniform(interval.low, interval.high, _PLACEMENTS)
-        for interval in (config.length_m, config.width_m, config.gap_ego_m, config.gap_cross_m)
-    )
+    drawn = _draw(config, side, world_seed)
     start = min(lane.ego_zone_center_m - 0.5 * lane.ego_zone_length_m for lane in model.lanes)
-    result = np.zeros((_PLACEMENTS, 4, 2))
+
+    def try_moves(which: Integers, back: Floats, away: Floats) -> tuple[Floats, Booleans]:
+        """Return corners and validity of rectangles `which` moved back and away (W, ...)."""
+        of = _Drawn(*(values[which].reshape((-1,) + (1,) * (back.ndim - 1)) for values in drawn))
+        inner = of.gap_ego + model.ego_path.half_width_m + away
+        corners = _rectangles(model, start + _BEYOND_M - back, inner, of.length, of.width, side)
+        return corners, _free(corners, roads, of.gap_ego, of.gap_cross)
+
+    moved, found = _coarse_moves(try_moves)
+    which = np.flatnonzero(found)
+    moved = moved[which]
+    # Then back towards the corner, as far as the gaps allow.
+    for step in _FINE_STEPS_M:
+        for axis in (0, 1):
+            closer = moved.copy()
+            closer[:, axis] = np.maximum(closer[:, axis] - step, 0.0)
+            _, free = try_moves(which, closer[:, 0], closer[:, 1])
+            moved[free] = closer[free]
+    corners, _ = try_moves(which, moved[:, 0], moved[:, 1])
+    return corners
+
+
+def _coarse_moves(
+    try_moves: Callable[[Integers, Floats, Floats], tuple[Floats, Booleans]],
+) -> tuple[Floats, Booleans]:
+    """Return the first moves (K, 2), back and away, that suit each rectangle, and which (K,)."""
+    moved = np.zeros((_PLACEMENTS, 2))
     found = np.zeros(_PLACEMENTS, dtype=np.bool_)
-    moves = np.arange(0.0, _MOST_MOVED_M + _STEP_M, _STEP_M)
+    moves = np.arange(0.0, _MOST_MOVED_M + _COARSE_STEP_M, _COARSE_STEP_M)
     for least in range(len(moves)):
         # All ways to split one sum of moves between back and away, for all that are still open.
         still = np.flatnonzero(~found)
         if len(still) == 0:
             break
-        back = moves[: least + 1][None, :]
-        away = moves[least::-1][None, :]
-        corners = _rectangles(
-            model,
-            start + _BEYOND_M - back,
-            gap_ego[still, None] + model.ego_path.half_width_m + away,
-            length[still, None],
-            width[still, None],
-            side,
-        )
-        free = _free(corners, roads, gap_ego[still, None], gap_cross[still, None])
-        any_free = free.any(axis=1)
-        chosen = still[any_free]
-        result[chosen] = corners[any_free, free.argmax(axis=1)[any_free]]
-        found[chosen] = True
-    return result[found]
+        back, away = moves[: least + 1][None, :], moves[least::-1][None, :]
+        _, free = try_moves(still, back, away)
+        suits = free.any(axis=1)
+        first = free.argmax(axis=1)[suits]
+        moved[still[suits]] = np.column_stack((back[0, first], away[0, first]))
+        found[still[suits]] = True
+    return moved, found
 
 
 def _rectangles(
@@ -161,10 +196,10 @@ def _rectangles(
 def _free(corners: Floats, roads: _Roads, gap_ego: Floats, gap_cross: Floats) -> Booleans:
     """Tell which rectangles (..., 4, 2) keep their gaps."""
     boxes = shapely.polygons(corners)
-    least = np.minimum(gap_ego, gap_cross)
-    free: Booleans = ~(
-        shapely.dwithin(roads.ego, boxes, gap_ego - _ROUNDING_M)
-        | shapely.dwithin(roads.crossing, boxes, gap_cross - _ROUNDING_M)
-        | shapely.dwithin(roads.other, boxes, least - _ROUNDING_M)
-    )
+    free = np.ones(boxes.shape, dtype=np.bool_)
+    gaps = (gap_ego, gap_cross, np.minimum(gap_ego, gap_cross))
+    for road, gap in zip(roads, gaps, strict=True):
+        # Real roads have thousands of edges: what one road rules out is not held against the next.
+        least = np.broadcast_to(gap - _ROUNDING_M, boxes.shape)[free]
+        free[free] = ~shapely.dwithin(road, boxes[free], least)
     return free

@@ -11,23 +11,26 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from planner_driver import PlannerDriver
 
-from risk_dqn_planner.intersection.builder import build_intersection
 from risk_dqn_planner.intersection.model import IntersectionModel
-from risk_dqn_planner.map.loader import load_map
+from sim_bridge.environment.place import Place, load_place
 from sim_bridge.ros.node_group import NodeGroup
-from sim_bridge.ros.run_settings import RunSettings, default_settings
+from sim_bridge.ros.run_settings import RunSettings, own_map_settings
 from sim_bridge.ros.session import ros_session
 
 
 @pytest.fixture(scope="session")
 def settings() -> RunSettings:
-    return default_settings()
+    return own_map_settings()
 
 
 @pytest.fixture(scope="session")
-def model(settings: RunSettings) -> IntersectionModel:
-    road_map = load_map(settings.map_file, settings.origin, settings.projector)
-    return build_intersection(road_map, settings.route)
+def place(settings: RunSettings) -> Place:
+    return load_place(settings.map_name)
+
+
+@pytest.fixture(scope="session")
+def model(place: Place) -> IntersectionModel:
+    return place.model
 
 
 @pytest.fixture(scope="module")

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Where episodes take place: an intersection of an own map or of any Lanelet2 file."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 from risk_dqn_planner.errors import ConfigurationError
 from risk_dqn_planner.intersection.builder import build_intersection
 from risk_dqn_planner.intersection.model import IntersectionModel
-from risk_dqn_planner.map.loader import MapOrigin, load_map
+from risk_dqn_planner.map.loader import MapOrigin, RoadMap, load_map
 from sim_bridge.maps import shipped_map
 from sim_bridge.scenario import Scenario
 from sim_bridge.simulation import Simulation
@@ -47,7 +48,15 @@ def load_place(
         path, route, origin = own.path, route or own.route, origin or own.origin
     if route is None:
         raise ConfigurationError(f"{map_name} is no own map, so its route must be given")
-    road_map = load_map(path, origin, projector)
+    return place_on(map_name, load_map(path, origin, projector), route)
+
+
+def place_on(map_name: str, road_map: RoadMap, route: Sequence[int]) -> Place:
+    """Take the intersection along a route of a loaded map.
+
+    Raises:
+        RouteError: the route does not fit the map.
+    """
     outlines = tuple(
         np.array([(point.x, point.y) for point in lanelet.polygon2d()])
         for lanelet in road_map.lanelet_map.laneletLayer

@@ -7,123 +7,14 @@ Exit code: 0 all decisions are as recorded, 1 some differ, 2 the bag or a settin
 import argparse
 import sys
 import tempfile
-import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
-from itertools import groupby
+from collections.abc import Sequence
 from pathlib import Path
 
 import yaml
-from intersection_msgs.msg import Decision
-from rclpy.node import Node
-from rclpy.serialization import deserialize_message
 
-from risk_dqn_planner.errors import BagError, ConfigurationError, PlannerError
-from sim_bridge.ros.comparison import Difference, difference
-from sim_bridge.ros.node_group import NodeGroup
-from sim_bridge.ros.pacing import EPISODE_GAP_NS, LockStep, PlannerLink, WallPace, pass_time
+from risk_dqn_planner.errors import ConfigurationError, PlannerError
 from sim_bridge.ros.process import ParameterValue
-from sim_bridge.ros.recording import Stored, read_bag
-from sim_bridge.ros.run_settings import from_notes
-from sim_bridge.ros.session import SilentPlannerError, ros_session
-from sim_bridge.ros.topics import DECISION, INPUTS, OBJECTS, SITUATION
-
-_START_S = 120.0
-_LOOK_AGAIN_S = 1.0
-_ANSWER_S = 5.0
-
-
-@dataclass(frozen=True)
-class Frame:
-    """The inputs of one time, and the decision that was taken on them, if one was."""
-
-    stamp_ns: int
-    inputs: list[Stored] = field(default_factory=list)
-    decision: Decision | None = None
-
-
-def frames(messages: Sequence[Stored]) -> Iterator[Frame]:
-    """Group a bag's messages by time; decisions taken without inputs are left out."""
-    ordered = sorted(messages, key=lambda message: message.stamp_ns)
-    for stamp_ns, group in groupby(ordered, key=lambda message: message.stamp_ns):
-        parts = list(group)
-        inputs = [m for topic in INPUTS for m in parts if m.topic == topic.name]
-        decisions = [m for m in parts if m.topic == DECISION.name]
-        if not any(m.topic == OBJECTS.name for m in inputs):
-            continue
-        decision = deserialize_message(decisions[-1].data, Decision) if decisions else None
-        yield Frame(stamp_ns, inputs, decision)
-
-
-@dataclass(frozen=True)
-class Replayed:
-    """What came of a replay: how many decisions were compared, and those that differ."""
-
-    compared: int
-    differences: list[Difference]
-
-
-class Replayer:
-    """Plays frames to a running planner in lock-step."""
-
-    def __init__(self, node: Node) -> None:
-        self._publishers = {
-            topic.name: node.create_publisher(topic.message, topic.name, topic.qos)
-            for topic in INPUTS
-        }
-        self._link = PlannerLink(node, SITUATION.name, DECISION.name)
-        self._pacing = LockStep(self._link, WallPace(0.0), _ANSWER_S)
-
-    def meet_planner(self, check: Callable[[], None]) -> None:
-        """Wait until the planner reads the inputs and answers.
-
-        Raises:
-            SilentPlannerError: it does not.
-        """
-        deadline = time.monotonic() + _START_S
-        while self._link.meet(self._inputs_are_read, _LOOK_AGAIN_S) is None:
-            check()
-            if time.monotonic() > deadline:
-                raise SilentPlannerError(f"the planner has decided nothing for {_START_S:g} s")
-
-    def _inputs_are_read(self) -> bool:
-        return all(p.get_subscription_count() > 0 for p in self._publishers.values())
-
-    def play(self, recorded: Sequence[Frame]) -> Iterator[tuple[Decision, Decision | None]]:
-        """Yield each recorded decision with the one that is taken now on the same inputs."""
-        before_ns: int | None = None
-        for frame in recorded:
-            # After the warm-up there is a pause too, as there was before the recording.
-            gap_from_ns = frame.stamp_ns - EPISODE_GAP_NS if before_ns is None else before_ns
-            pass_time(self._pacing, gap_from_ns, frame.stamp_ns)
-            for message in frame.inputs:
-                self._publishers[message.topic].publish(message.data)
-            self._pacing.reach(frame.stamp_ns)
-            if frame.decision is not None:
-                yield frame.decision, self._pacing.decision(frame.stamp_ns)
-            before_ns = frame.stamp_ns
-
-
-def replay(path: Path, overrides: Mapping[str, ParameterValue], log_folder: Path) -> Replayed:
-    """Replay one bag through node processes.
-
-    Raises:
-        BagError: the bag cannot be used. PlannerError: the nodes cannot.
-    """
-    bag = read_bag(path, (*INPUTS, DECISION))
-    recorded = list(frames(bag.messages))
-    if not any(frame.decision for frame in recorded):
-        raise BagError(f"{path} holds no decision that was taken on inputs, nothing to compare")
-    commands = from_notes(path, bag.notes, overrides).planner_commands()
-    with ros_session("replay") as node, NodeGroup(commands, log_folder) as planner:
-        replayer = Replayer(node)
-        replayer.meet_planner(planner.check)
-        pairs = []
-        for pair in replayer.play(recorded):
-            planner.check()
-            pairs.append(pair)
-    found = [difference(before, now) for before, now in pairs]
-    return Replayed(len(pairs), [d for d in found if d is not None])
+from sim_bridge.ros.replayer import replay
 
 
 def parse_override(text: str) -> tuple[str, ParameterValue]:

@@ -112,11 +112,11 @@ def add_run_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--scenario", default=DEFAULT_SCENARIO, help="name [%(default)s]")
 
 
-def default_settings() -> RunSettings:
-    """Return what is driven when nothing is asked for."""
+def own_map_settings(name: str = DEFAULT_MAP) -> RunSettings:
+    """Return what is driven on an own map when nothing else is asked for."""
     parser = argparse.ArgumentParser()
     add_run_arguments(parser)
-    return run_settings(parser.parse_args([]))
+    return run_settings(parser.parse_args(["--map", name]))
 
 
 def run_settings(arguments: argparse.Namespace) -> RunSettings:

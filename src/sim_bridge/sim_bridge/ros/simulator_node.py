@@ -17,6 +17,7 @@ from risk_dqn_planner.errors import ConfigurationError, PlannerError
 from risk_dqn_planner.ros.clock import steady_timer
 from risk_dqn_planner.ros.main import run
 from risk_dqn_planner.ros.parameters import MapParameters, declare
+from sim_bridge.environment.place import place_on
 from sim_bridge.ros.building import SimulationShelf
 from sim_bridge.ros.episodes import EpisodePlayer
 from sim_bridge.ros.frames import FramePublisher
@@ -92,7 +93,8 @@ class SimulatorNode(Node):
         super().__init__("simulator")
         maps = declare(self, MapParameters)
         self._config = declare(self, SimulatorParameters)
-        self._shelf = SimulationShelf(maps.load(), self._declare_route())
+        place = place_on(maps.map_file, maps.load(), self._declare_route())
+        self._shelf = SimulationShelf(place)
         first = self._shelf.get(self._config.scenario)
         self._publisher = FramePublisher(self, maps.map_frame)
         self._publisher.publish_route(first, 0)

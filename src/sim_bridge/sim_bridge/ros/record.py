@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Records a small bag of each own map: one episode's inputs and the decisions taken on them."""
+
+import argparse
+import shutil
+import sys
+import tempfile
+from collections.abc import Sequence
+from contextlib import closing
+from pathlib import Path
+
+from risk_dqn_planner.errors import PlannerError
+from sim_bridge.maps import map_names
+from sim_bridge.ros.drive import drive
+from sim_bridge.ros.pacing import DECISION_PERIOD_NS
+from sim_bridge.ros.recording import BagWriter, Stored
+from sim_bridge.ros.run_settings import RunSettings, own_map_settings
+from sim_bridge.ros.summary import episode_result
+from sim_bridge.ros.topics import DECISION, INPUTS
+
+_TOPICS = (*INPUTS, DECISION)
+_DEFAULT_SEED = 4
+
+
+def at_decisions(messages: Sequence[Stored]) -> list[Stored]:
+    """Keep the inputs that decisions were taken on, a fifth of all, and the decisions."""
+    names = {topic.name for topic in _TOPICS}
+    return [m for m in messages if m.topic in names and m.stamp_ns % DECISION_PERIOD_NS == 0]
+
+
+def record(settings: RunSettings, seed: int, target: Path) -> str:
+    """Drive one episode and put its bag in place of `target`; return how it went.
+
+    Raises:
+        PlannerError: a setting is no good, a node died or the episode never ended.
+    """
+    with tempfile.TemporaryDirectory(prefix="record_") as folder:
+        new = Path(folder) / target.name
+        with closing(drive(settings, [seed], 0.0, Path(folder) / "log")) as episodes:
+            episode = next(episodes)
+            with BagWriter(new, _TOPICS, {**settings.notes(), "seed": str(seed)}) as bag:
+                bag.write(at_decisions(episode.messages))
+        shutil.rmtree(target, ignore_errors=True)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        shutil.move(new, target)
+    result = episode_result(episode.end)
+    return f"{result.result} after {result.duration_s:.1f} s"
+
+
+def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog="record", description=__doc__)
+    parser.add_argument("--map", choices=map_names(), help="only this map [all]")
+    parser.add_argument("--seed", type=int, default=_DEFAULT_SEED, help="[%(default)s]")
+    parser.add_argument(
+        "--folder", type=Path, default=Path("bags"), help="where the bags go [%(default)s]"
+    )
+    return parser.parse_args(argv)
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command."""
+    arguments = _arguments(argv)
+    names = [arguments.map] if arguments.map else map_names()
+    try:
+        for name in names:
+            went = record(own_map_settings(name), arguments.seed, arguments.folder / name)
+            size_kb = sum(f.stat().st_size for f in (arguments.folder / name).iterdir()) / 1000.0
+            print(f"{arguments.folder / name}: {went}, {size_kb:.0f} kB")
+    except PlannerError as error:
+        print(f"record: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        return 130
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

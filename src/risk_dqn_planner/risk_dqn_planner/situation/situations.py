@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The lane-based situation of the paper as arrays, for a batch or, on the vehicle, a batch of one."""
+"""The lane-based situation of the paper as arrays: a batch, or on the vehicle a batch of one."""
 
 from typing import NamedTuple
 

@@ -2,12 +2,11 @@
 """What is assumed of vehicles: footprints, and how fast they speed up and brake."""
 
 from dataclasses import dataclass, fields
-from typing import Any
 
 from risk_dqn_planner.errors import ConfigurationError
 
 
-def require_positive(config: Any) -> None:
+def require_positive(config: "VehicleDimensions | EgoLimits | TrafficLimits") -> None:
     """Raise ConfigurationError naming the first field of a dataclass that is not above zero."""
     for field in fields(config):
         value = getattr(config, field.name)

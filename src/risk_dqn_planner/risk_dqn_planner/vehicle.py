@@ -2,11 +2,15 @@
 """What is assumed of vehicles: footprints, and how fast they speed up and brake."""
 
 from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING
 
 from risk_dqn_planner.errors import ConfigurationError
 
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
 
-def require_positive(config: "VehicleDimensions | EgoLimits | TrafficLimits") -> None:
+
+def require_positive(config: "DataclassInstance") -> None:
     """Raise ConfigurationError naming the first field of a dataclass that is not above zero."""
     for field in fields(config):
         value = getattr(config, field.name)

@@ -30,14 +30,14 @@ PRESETS = {
     ),
     "tuned": TrainingConfig(
         preset="tuned",
-        steps=1_000_000,
-        environments=256,
+        steps=500_000,
+        environments=64,
         updates_per_step=1,
-        batch_size=512,
-        warmup_steps=10_000,
+        batch_size=256,
+        warmup_steps=5_000,
         gamma=0.99,
-        n_step=3,
-        replay=ReplayConfig(capacity=200_000),
+        n_step=5,
+        replay=ReplayConfig(capacity=100_000),
         exploration=ExplorationConfig(start=1.0, end=0.02, share=0.3),
         learner=LearnerConfig(
             learning_rate=1e-3,
@@ -46,7 +46,7 @@ PRESETS = {
             max_gradient_norm=10.0,
         ),
         evaluation=EvaluationConfig(
-            every_episodes=2_000, episodes=100, validation_every=2, validation_episodes=500
+            every_episodes=1_000, episodes=20, validation_every=2, validation_episodes=500
         ),
     ),
 }

@@ -118,7 +118,8 @@ def _cells(rows: list[list[tuple[float, ...]]], cells: int) -> tuple[Integers, I
 
     Beyond the last cell, where vehicles wait for their replacement, nothing is matched.
     """
-    first, piece = [], []
+    first: list[int] = []
+    piece: list[int] = []
     before = 0
     for row in rows:
         for cell in range(cells):

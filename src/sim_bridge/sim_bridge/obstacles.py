@@ -132,6 +132,8 @@ def _placements(
 
     moved, found = _coarse_moves(try_moves)
     which = np.flatnonzero(found)
+    if len(which) == 0:
+        return np.zeros((0, 4, 2))
     moved = moved[which]
     # Then back towards the corner, as far as the gaps allow.
     for step in _FINE_STEPS_M:

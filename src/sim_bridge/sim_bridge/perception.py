@@ -15,22 +15,25 @@ from sim_bridge.settings import Settings
 from sim_bridge.sight_lines import SightLines
 from sim_bridge.state import NOBODY, Episodes, Vehicles
 from sim_bridge.visibility import HALF_PLANES, cast_shadow, first_hidden, point_hidden
-from sim_bridge.world import EgoLane, Lanes, Paths, World
+from sim_bridge.world import EgoLane, World
 
 # Errors of perceived speeds are numbered by inner step and vehicle id.
 _MOST_IDS = 1 << 20
 
 
 class View(NamedTuple):
-    """Where B sensors are and what stands in their way.
+    """Where B sensors are, what stands in their way, and what they see: overwritten at each look.
 
     x_m, y_m (B,). shadows (B, O, 4, 3), see `cast_shadow`; cast (B,): how many of O there are.
+    seen (B, N): vehicles; measured_mps (B, N): their speeds, with the sensor's noise.
     """
 
     x_m: Floats
     y_m: Floats
     shadows: Floats
     cast: Integers
+    seen: Booleans
+    measured_mps: Floats
 
 
 class VehiclePoses(NamedTuple):
@@ -50,10 +53,20 @@ class VehiclePoses(NamedTuple):
     hidden: Booleans
 
 
-def empty_view(batch: int, obstacles: int) -> View:
+def empty_view(batch: int, vehicles: int, obstacles: int) -> View:
     """Return room for the views of a batch."""
-    shadows = np.zeros((batch, obstacles, HALF_PLANES, 3))
-    return View(np.zeros(batch), np.zeros(batch), shadows, np.zeros(batch, dtype=np.int64))
+    return View(
+        x_m=np.zeros(batch),
+        y_m=np.zeros(batch),
+        shadows=np.zeros((batch, obstacles, HALF_PLANES, 3)),
+        cast=np.zeros(batch, dtype=np.int64),
+        seen=np.zeros((batch, vehicles), dtype=np.bool_),
+        measured_mps=np.zeros((batch, vehicles)),
+    )
+
+
+# Fields of named tuples are taken out before the loops: reading them inside costs a count of
+# references each time.
 
 
 @kernel
@@ -62,52 +75,53 @@ def look(ego: EgoLane, corners: Floats, offset_m: float, episodes: Episodes, vie
 
     corners (2, K, 4, 2): catalogue of the obstacles.
     """
-    obstacle = episodes.obstacle
-    for b in range(len(view.x_m)):
-        x, y, heading = table_pose(ego.table, 0, episodes.ego_s_m[b])
-        x += offset_m * math.cos(heading)
-        y += offset_m * math.sin(heading)
+    table, ego_s_m, obstacle = ego.table, episodes.ego_s_m, episodes.obstacle
+    x_m, y_m, shadows, cast = view.x_m, view.y_m, view.shadows, view.cast
+    for b in range(len(x_m)):
+        x, y, heading = table_pose(table, 0, ego_s_m[b])
+        if offset_m != 0.0:
+            x += offset_m * math.cos(heading)
+            y += offset_m * math.sin(heading)
         count = 0
         for o in range(obstacle.shape[1]):
             if obstacle[b, o] != NOBODY:
-                cast_shadow(corners[o % 2, obstacle[b, o]], x, y, view.shadows[b, count])
+                cast_shadow(corners, o % 2, obstacle[b, o], x, y, shadows, b, count)
                 count += 1
-        view.x_m[b], view.y_m[b], view.cast[b] = x, y, count
+        x_m[b], y_m[b], cast[b] = x, y, count
 
 
 @kernel
-def perceive_ego_and_lanes(
-    ego: EgoLane,
-    lanes: Lanes,
-    sight: SightLines,
-    range_m: float,
-    episodes: Episodes,
-    view: View,
-    situations: Situations,
+def perceive_egos(
+    ego: EgoLane, ego_zone_center_m: Floats, episodes: Episodes, situations: Situations
 ) -> None:
-    """Fill what situations say about the ego, and how far each lane is seen."""
-    hidden_m, ego_distance_m = situations.lane_hidden_distance_m, situations.lane_ego_distance_m
-    for b in range(len(view.x_m)):
-        ego_s = episodes.ego_s_m[b]
-        situations.stop_line_distance_m[b] = ego.stop_line_m - ego_s
-        situations.goal_distance_m[b] = ego.goal_m - ego_s
-        situations.ego_speed_mps[b] = episodes.ego_speed_mps[b]
-        x, y, count = view.x_m[b], view.y_m[b], view.cast[b]
-        for lane in range(len(lanes.id)):
-            ego_distance_m[b, lane] = lanes.ego_zone_center_m[lane] - ego_s
+    """Fill what situations say about the egos; ego_zone_center_m (M,)."""
+    ego_s_m, speed_mps = episodes.ego_s_m, episodes.ego_speed_mps
+    stop_line_m, goal_m = ego.stop_line_m, ego.goal_m
+    to_stop_line_m, to_goal_m = situations.stop_line_distance_m, situations.goal_distance_m
+    to_zone_m, perceived_mps = situations.lane_ego_distance_m, situations.ego_speed_mps
+    for b in range(len(ego_s_m)):
+        s = ego_s_m[b]
+        to_stop_line_m[b] = stop_line_m - s
+        to_goal_m[b] = goal_m - s
+        perceived_mps[b] = speed_mps[b]
+        for lane in range(len(ego_zone_center_m)):
+            to_zone_m[b, lane] = ego_zone_center_m[lane] - s
+
+
+@kernel
+def perceive_lanes(
+    first_path: Integers, sight: SightLines, range_m: float, view: View, hidden_m: Floats
+) -> None:
+    """Fill how far each lane is seen (B, M); the paths of lane j begin at first_path[j]."""
+    xy, distance_m, points = sight.xy, sight.distance_m, sight.points
+    x_m, y_m, shadows, cast = view.x_m, view.y_m, view.shadows, view.cast
+    for b in range(len(x_m)):
+        x, y, count = x_m[b], y_m[b], cast[b]
+        for lane in range(len(first_path) - 1):
             nearest = math.inf
-            for p in range(lanes.first_path[lane], lanes.first_path[lane + 1]):
+            for p in range(first_path[lane], first_path[lane + 1]):
                 hidden = first_hidden(
-                    sight.xy,
-                    sight.distance_m,
-                    p,
-                    sight.points[p],
-                    x,
-                    y,
-                    range_m,
-                    view.shadows,
-                    b,
-                    count,
+                    xy, distance_m, p, points[p], x, y, range_m, shadows, b, count
                 )
                 nearest = min(nearest, hidden)
             hidden_m[b, lane] = nearest
@@ -124,56 +138,78 @@ def measured_speed(
 
 
 @kernel
-def perceive_vehicles(
-    paths: Paths,
-    matches: Matches,
+def see_vehicles(
+    table: Floats,
     settings: Settings,
     episodes: Episodes,
     vehicles: Vehicles,
     view: View,
-    situations: Situations,
+    seen: Booleans,
+    measured_mps: Floats,
 ) -> None:
-    """Fill in the seen vehicles, packed at the front, in the order of their places."""
-    driving, path, s_m = vehicles.driving, vehicles.path, vehicles.s_m
-    low_m, high_m = matches.low_m, matches.high_m
-    mask, distance_m = situations.vehicle_mask, situations.vehicle_distance_m
-    for b in range(len(view.x_m)):
-        used = 0
+    """Fill which vehicles are seen (B, N), and their speeds as perceived; table as in Paths."""
+    driving, path, s_m, speed_mps = (
+        vehicles.driving,
+        vehicles.path,
+        vehicles.s_m,
+        vehicles.speed_mps,
+    )
+    seed, tick, ids = episodes.seed, episodes.tick, vehicles.id
+    x_m, y_m, shadows, cast = view.x_m, view.y_m, view.shadows, view.cast
+    range_m, noise_mps = settings.sensor_range_m, settings.velocity_noise_mps
+    for b in range(driving.shape[0]):
         for i in range(driving.shape[1]):
+            seen[b, i] = False
             if not driving[b, i]:
                 continue
-            p, s = path[b, i], s_m[b, i]
-            x, y, _ = table_pose(paths.table, p, s)
-            if point_hidden(
-                x,
-                y,
-                view.x_m[b],
-                view.y_m[b],
-                settings.sensor_range_m,
-                view.shadows,
-                b,
-                view.cast[b],
-            ):
-                continue
-            speed = measured_speed(
-                vehicles.speed_mps[b, i],
-                settings.velocity_noise_mps,
-                episodes.seed[b],
-                episodes.tick[b],
-                vehicles.id[b, i],
+            x, y, _ = table_pose(table, path[b, i], s_m[b, i])
+            seen[b, i] = not point_hidden(x, y, x_m[b], y_m[b], range_m, shadows, b, cast[b])
+            measured_mps[b, i] = measured_speed(
+                speed_mps[b, i], noise_mps, seed[b], tick[b], ids[b, i]
             )
-            cell = min(max(int(s), 0), matches.first.shape[1] - 2)
-            for k in range(matches.first[p, cell], matches.first[p, cell + 1]):
-                m = matches.piece[k]
+
+
+@kernel
+def match_vehicles(
+    matches: Matches,
+    vehicles: Vehicles,
+    seen: Booleans,
+    measured_mps: Floats,
+    situations: Situations,
+) -> None:
+    """Fill in the seen vehicles, packed at the front, in the order of their places and lanes."""
+    path, s_m, ids = vehicles.path, vehicles.s_m, vehicles.id
+    first, piece, lane = matches.first, matches.piece, matches.lane
+    low_m, high_m, start_m, change = (
+        matches.low_m,
+        matches.high_m,
+        matches.distance_m,
+        matches.change,
+    )
+    share, share_change = matches.share, matches.share_change
+    mask, found_id, found_lane = (
+        situations.vehicle_mask,
+        situations.vehicle_id,
+        situations.vehicle_lane,
+    )
+    distance_m, along_mps = situations.vehicle_distance_m, situations.vehicle_speed_mps
+    for b in range(seen.shape[0]):
+        used = 0
+        for i in range(seen.shape[1]):
+            if not seen[b, i]:
+                continue
+            p, s = path[b, i], s_m[b, i]
+            cell = min(max(int(s), 0), first.shape[1] - 2)
+            for k in range(first[p, cell], first[p, cell + 1]):
+                m = piece[k]
                 along = s - low_m[m]
                 if along < 0.0 or s >= high_m[m]:
                     continue
                 mask[b, used] = True
-                situations.vehicle_id[b, used] = vehicles.id[b, i]
-                situations.vehicle_lane[b, used] = matches.lane[m]
-                distance_m[b, used] = matches.distance_m[m] + along * matches.change[m]
-                share = matches.share[m] + along * matches.share_change[m]
-                situations.vehicle_speed_mps[b, used] = speed * share
+                found_id[b, used] = ids[b, i]
+                found_lane[b, used] = lane[m]
+                distance_m[b, used] = start_m[m] + along * change[m]
+                along_mps[b, used] = measured_mps[b, i] * (share[m] + along * share_change[m])
                 used += 1
         for k in range(used, mask.shape[1]):
             mask[b, k] = False
@@ -190,10 +226,18 @@ def perceive(
 ) -> None:
     """Fill the situations of all episodes; what describes the lanes for good must be there."""
     look(world.ego, world.obstacles.corners, settings.sensor_offset_m, episodes, view)
-    perceive_ego_and_lanes(
-        world.ego, world.lanes, world.sight, settings.sensor_range_m, episodes, view, situations
+    perceive_egos(world.ego, world.lanes.ego_zone_center_m, episodes, situations)
+    perceive_lanes(
+        world.lanes.first_path,
+        world.sight,
+        settings.sensor_range_m,
+        view,
+        situations.lane_hidden_distance_m,
     )
-    perceive_vehicles(world.paths, world.matches, settings, episodes, vehicles, view, situations)
+    see_vehicles(
+        world.paths.table, settings, episodes, vehicles, view, view.seen, view.measured_mps
+    )
+    match_vehicles(world.matches, vehicles, view.seen, view.measured_mps, situations)
 
 
 @kernel
@@ -206,28 +250,10 @@ def reveal(
     poses: VehiclePoses,
 ) -> None:
     """Fill the truth about all vehicles, and whether the ego sees them."""
+    table, path, s_m = world.paths.table, vehicles.path, vehicles.s_m
+    x_m, y_m, heading_rad = poses.x_m, poses.y_m, poses.heading_rad
     look(world.ego, world.obstacles.corners, settings.sensor_offset_m, episodes, view)
-    for b in range(len(view.x_m)):
-        for i in range(vehicles.path.shape[1]):
-            poses.mask[b, i] = vehicles.driving[b, i]
-            x, y, heading = table_pose(world.paths.table, vehicles.path[b, i], vehicles.s_m[b, i])
-            poses.x_m[b, i], poses.y_m[b, i], poses.heading_rad[b, i] = x, y, heading
-            poses.id[b, i] = vehicles.id[b, i]
-            poses.speed_mps[b, i] = vehicles.speed_mps[b, i]
-            poses.measured_speed_mps[b, i] = measured_speed(
-                vehicles.speed_mps[b, i],
-                settings.velocity_noise_mps,
-                episodes.seed[b],
-                episodes.tick[b],
-                vehicles.id[b, i],
-            )
-            poses.hidden[b, i] = point_hidden(
-                x,
-                y,
-                view.x_m[b],
-                view.y_m[b],
-                settings.sensor_range_m,
-                view.shadows,
-                b,
-                view.cast[b],
-            )
+    see_vehicles(table, settings, episodes, vehicles, view, view.seen, view.measured_mps)
+    for b in range(path.shape[0]):
+        for i in range(path.shape[1]):
+            x_m[b, i], y_m[b, i], heading_rad[b, i] = table_pose(table, path[b, i], s_m[b, i])

@@ -134,13 +134,14 @@ def come_and_go(
 ) -> None:
     """Where a decision is due, replace vehicles that have left and let waiting ones in."""
     driving, waiting, path, s_m = vehicles.driving, vehicles.waiting, vehicles.path, vehicles.s_m
+    running, phase, length_m = episodes.running, episodes.phase, paths.length_m
     draws, gap_m = settings.draws, settings.idm.standstill_gap_m
     batch, count = driving.shape
     for b in range(batch):
-        if not episodes.running[b] or episodes.phase[b] != 0:
+        if not running[b] or phase[b] != 0:
             continue
         for i in range(count):
-            if driving[b, i] and s_m[b, i] > paths.length_m[path[b, i]]:
+            if driving[b, i] and s_m[b, i] > length_m[path[b, i]]:
                 driving[b, i] = False
                 if draws.respawn:
                     choose_vehicle(paths, lanes, draws, episodes, vehicles, b, i)

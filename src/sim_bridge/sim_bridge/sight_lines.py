@@ -10,7 +10,7 @@ from risk_dqn_planner.intersection.model import IntersectionModel
 from risk_dqn_planner.situation.situations import Floats, Integers
 from sim_bridge.path_geometry import simplified
 
-_TOLERANCE_M = 0.03
+_TOLERANCE_M = 0.05
 
 
 class SightLines(NamedTuple):

@@ -96,7 +96,7 @@ class Simulation:
         vehicles = int(scenario.traffic.vehicles.high)
         obstacles = 2 * scenario.obstacles.per_side
         self.state = empty_state(batch, vehicles, obstacles, len(model.lanes))
-        self._view = empty_view(batch, obstacles)
+        self._view = empty_view(batch, vehicles, obstacles)
 
     def reset(self, seeds: ArrayLike, mask: ArrayLike | None = None) -> None:
         """Start the episodes of seeds (B,), or only those that `mask` (B,) names.
@@ -215,16 +215,19 @@ class Simulation:
         episodes, vehicles, _ = self.state
         shape = vehicles.driving.shape
         poses = VehiclePoses(
-            mask=np.zeros(shape, dtype=np.bool_),
-            id=np.zeros(shape, dtype=np.int64),
+            mask=vehicles.driving.copy(),
+            id=vehicles.id.copy(),
             x_m=np.zeros(shape),
             y_m=np.zeros(shape),
             heading_rad=np.zeros(shape),
-            speed_mps=np.zeros(shape),
+            speed_mps=vehicles.speed_mps.copy(),
             measured_speed_mps=np.zeros(shape),
             hidden=np.zeros(shape, dtype=np.bool_),
         )
-        reveal(self.world, self.settings, episodes, vehicles, self._view, poses)
+        view = self._view
+        reveal(self.world, self.settings, episodes, vehicles, view, poses)
+        poses.hidden[:] = vehicles.driving & ~view.seen
+        poses.measured_speed_mps[:] = view.measured_mps
         return poses
 
     def obstacles(self, episode: int = 0) -> list[Floats]:

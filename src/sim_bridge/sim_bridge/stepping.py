@@ -47,23 +47,33 @@ def advance(
         follow_egos(lengths_m, first_zone_m, ego_sharing, idm, episodes, vehicles)
         if settings.draws.yielding_share > 0.0:
             yield_to_egos(paths, lanes, idm, episodes, vehicles)
-        move_vehicles(paths.exit_m, paths.lane, settings.step_s, episodes, vehicles, counts)
+        move_vehicles(
+            paths.exit_m, paths.lane, settings.step_s, episodes, vehicles, counts.last_left_s
+        )
         move_egos(settings, episodes, actions)
-        note_time_gaps(first_zone_m, lanes, paths, settings, state)
-        conclude(ego, paths, settings, state)
+        note_time_gaps(first_zone_m, lanes, paths, settings.step_s, state)
+        detect_collisions(ego, paths, episodes, vehicles)
+        conclude(ego.goal_m, settings.limit_steps, episodes, counts)
+
+
+# Fields of named tuples are taken out before the loops: reading them inside costs a count of
+# references each time.
 
 
 @kernel
 def count_decisions(episodes: Episodes, counts: Counts, actions: Integers) -> None:
     """Count actions (B,) and their changes where a decision is due."""
+    running, phase, speed_mps = episodes.running, episodes.phase, episodes.ego_speed_mps
+    action_counts, changes, last = counts.action_counts, counts.action_changes, counts.last_action
+    speed_at_decision_mps = counts.speed_at_decision_mps
     for b in range(len(actions)):
-        if not episodes.running[b] or episodes.phase[b] != 0:
+        if not running[b] or phase[b] != 0:
             continue
-        action, last = actions[b], counts.last_action[b]
-        counts.action_counts[b, action] += 1
-        counts.action_changes[b] += last not in (NO_ACTION, action)
-        counts.last_action[b] = action
-        counts.speed_at_decision_mps[b] = episodes.ego_speed_mps[b]
+        action = actions[b]
+        action_counts[b, action] += 1
+        changes[b] += last[b] not in (NO_ACTION, action)
+        last[b] = action
+        speed_at_decision_mps[b] = speed_mps[b]
 
 
 @kernel
@@ -73,22 +83,23 @@ def move_vehicles(
     step_s: float,
     episodes: Episodes,
     vehicles: Vehicles,
-    counts: Counts,
+    last_left_s: Floats,
 ) -> None:
     """Move all other vehicles under their accelerations, noting who leaves a conflict zone.
 
-    exit_m, lane (P,): end of the zone on each path, and its lane.
+    exit_m, lane (P,): end of the zone on each path, and its lane; last_left_s (B, M) of Counts.
     """
-    driving, path, s_m, speed_mps = (
+    running, tick = episodes.running, episodes.tick
+    driving, path, s_m, speed_mps, acceleration_mps2 = (
         vehicles.driving,
         vehicles.path,
         vehicles.s_m,
         vehicles.speed_mps,
+        vehicles.acceleration_mps2,
     )
-    acceleration_mps2 = vehicles.acceleration_mps2
     batch, count = driving.shape
     for b in range(batch):
-        if not episodes.running[b]:
+        if not running[b]:
             continue
         for i in range(count):
             if not driving[b, i]:
@@ -99,49 +110,50 @@ def move_vehicles(
             s_m[b, i] = after
             p = path[b, i]
             if before <= exit_m[p] < after:
-                counts.last_left_s[b, lane[p]] = (episodes.tick[b] + 1) * step_s
+                last_left_s[b, lane[p]] = (tick[b] + 1) * step_s
 
 
 @kernel
 def move_egos(settings: Settings, episodes: Episodes, actions: Integers) -> None:
     """Let every ego carry out its action (B,), and let time pass."""
-    ego = settings.ego
+    running, tick, phase = episodes.running, episodes.tick, episodes.phase
+    s_m, step_m, speed_mps = episodes.ego_s_m, episodes.ego_step_m, episodes.ego_speed_mps
+    ego, decision_steps = settings.ego, settings.decision_steps
     for b in range(len(actions)):
-        if not episodes.running[b]:
+        if not running[b]:
             continue
-        episodes.tick[b] += 1
-        phase = episodes.phase[b] + 1
-        episodes.phase[b] = phase if phase < settings.decision_steps else 0
-        way, episodes.ego_speed_mps[b] = follow_target(
-            episodes.ego_speed_mps[b],
+        tick[b] += 1
+        phase[b] = phase[b] + 1 if phase[b] + 1 < decision_steps else 0
+        step_m[b], speed_mps[b] = follow_target(
+            speed_mps[b],
             target_speed(actions[b], ego.slow_mps, ego.fast_mps),
             settings.step_s,
             ego.acceleration_mps2,
             ego.braking_mps2,
         )
-        episodes.ego_s_m[b] += way
-        episodes.ego_step_m[b] = way
+        s_m[b] += step_m[b]
 
 
 @kernel
 def note_time_gaps(
-    first_zone_m: float, lanes: Lanes, paths: Paths, settings: Settings, state: SimulationState
+    first_zone_m: float, lanes: Lanes, paths: Paths, step_s: float, state: SimulationState
 ) -> None:
     """Note time gaps where an ego has just entered or left a conflict zone."""
-    episodes, least_s = state.episodes, state.counts.least_time_gap_s
+    running, tick = state.episodes.running, state.episodes.tick
+    s_m, step_m = state.episodes.ego_s_m, state.episodes.ego_step_m
+    least_s, last_left_s = state.counts.least_time_gap_s, state.counts.last_left_s
+    zone_m, ego_zone_m, center_m = lanes.zone_m, lanes.ego_zone_m, lanes.ego_zone_center_m
     for b in range(len(least_s)):
-        after = episodes.ego_s_m[b]
-        if not episodes.running[b] or after <= first_zone_m:
+        after = s_m[b]
+        if not running[b] or after <= first_zone_m:
             continue
-        before = after - episodes.ego_step_m[b]
-        for lane in range(len(lanes.id)):
-            half, center = 0.5 * lanes.ego_zone_m[lane], lanes.ego_zone_center_m[lane]
-            if before <= center - half < after:
-                now_s = episodes.tick[b] * settings.step_s
-                gap_s = now_s - state.counts.last_left_s[b, lane]
-                least_s[b] = min(least_s[b], gap_s)
-            if before <= center + half < after:
-                gap_s = time_to_next(lane, lanes.zone_m[lane], paths, state.vehicles, b)
+        before = after - step_m[b]
+        for lane in range(len(zone_m)):
+            half = 0.5 * ego_zone_m[lane]
+            if before <= center_m[lane] - half < after:
+                least_s[b] = min(least_s[b], tick[b] * step_s - last_left_s[b, lane])
+            if before <= center_m[lane] + half < after:
+                gap_s = time_to_next(lane, zone_m[lane], paths, state.vehicles, b)
                 least_s[b] = min(least_s[b], gap_s)
 
 
@@ -158,49 +170,54 @@ def time_to_next(lane: int, zone_m: float, paths: Paths, vehicles: Vehicles, b: 
 
 
 @kernel
-def conclude(ego: EgoLane, paths: Paths, settings: Settings, state: SimulationState) -> None:
-    """End episodes at a collision, the goal or the time limit, in this order."""
-    episodes, counts = state.episodes, state.counts
-    low, high = ego.contact_low_m, ego.contact_high_m
-    for b in range(len(episodes.running)):
-        if not episodes.running[b]:
+def detect_collisions(ego: EgoLane, paths: Paths, episodes: Episodes, vehicles: Vehicles) -> None:
+    """Mark episodes in which the ego's footprint overlaps another one."""
+    running, collided, ego_s_m = episodes.running, episodes.collided, episodes.ego_s_m
+    driving, path, s_m = vehicles.driving, vehicles.path, vehicles.s_m
+    low_m, high_m, ego_low_m, ego_high_m = (
+        paths.contact_low_m,
+        paths.contact_high_m,
+        ego.contact_low_m,
+        ego.contact_high_m,
+    )
+    ego_table, table = ego.table, paths.table
+    length_m, width_m = ego.length_m, ego.width_m
+    other_length_m, other_width_m = paths.vehicle_length_m, paths.vehicle_width_m
+    batch, count = driving.shape
+    for b in range(batch):
+        if not running[b] or ego_s_m[b] < ego_low_m or ego_s_m[b] > ego_high_m:
             continue
-        ego_s = episodes.ego_s_m[b]
-        if low <= ego_s <= high and collides(ego, paths, state.vehicles, b, ego_s):
-            episodes.collided[b] = True
-        elif ego_s >= ego.goal_m:
-            episodes.reached_goal[b] = True
-        elif episodes.tick[b] >= settings.limit_steps:
-            episodes.timed_out[b] = True
-        ended = episodes.collided[b] or episodes.reached_goal[b] or episodes.timed_out[b]
-        episodes.running[b] = not ended
-        if ended or episodes.phase[b] == 0:
-            lost = counts.speed_at_decision_mps[b] - episodes.ego_speed_mps[b]
-            counts.hard_brakes[b] += lost > _HARD_BRAKE_MPS
+        x, y, turn = table_pose(ego_table, 0, ego_s_m[b])
+        for i in range(count):
+            p, s = path[b, i], s_m[b, i]
+            if driving[b, i] and low_m[p] <= s <= high_m[p]:
+                px, py, other = table_pose(table, p, s)
+                collided[b] |= footprints_overlap(
+                    x, y, turn, length_m, width_m, px, py, other, other_length_m, other_width_m
+                )
 
 
 @kernel
-def collides(ego: EgoLane, paths: Paths, vehicles: Vehicles, b: int, ego_s: float) -> bool:
-    """Tell whether the ego's footprint overlaps another one in episode b."""
-    x, y, heading = table_pose(ego.table, 0, ego_s)
-    for i in range(vehicles.driving.shape[1]):
-        p, s = vehicles.path[b, i], vehicles.s_m[b, i]
-        if not vehicles.driving[b, i]:
+def conclude(goal_m: float, limit_steps: int, episodes: Episodes, counts: Counts) -> None:
+    """End episodes at a collision, the goal or the time limit, in this order."""
+    running, collided, reached_goal, timed_out = (
+        episodes.running,
+        episodes.collided,
+        episodes.reached_goal,
+        episodes.timed_out,
+    )
+    tick, phase, s_m, speed_mps = (
+        episodes.tick,
+        episodes.phase,
+        episodes.ego_s_m,
+        episodes.ego_speed_mps,
+    )
+    speed_at_decision_mps, hard_brakes = counts.speed_at_decision_mps, counts.hard_brakes
+    for b in range(len(running)):
+        if not running[b]:
             continue
-        if s < paths.contact_low_m[p] or s > paths.contact_high_m[p]:
-            continue
-        other_x, other_y, other_heading = table_pose(paths.table, p, s)
-        if footprints_overlap(
-            x,
-            y,
-            heading,
-            ego.length_m,
-            ego.width_m,
-            other_x,
-            other_y,
-            other_heading,
-            paths.vehicle_length_m,
-            paths.vehicle_width_m,
-        ):
-            return True
-    return False
+        reached_goal[b] = not collided[b] and s_m[b] >= goal_m
+        timed_out[b] = not (collided[b] or reached_goal[b]) and tick[b] >= limit_steps
+        running[b] = not (collided[b] or reached_goal[b] or timed_out[b])
+        if not running[b] or phase[b] == 0:
+            hard_brakes[b] += speed_at_decision_mps[b] - speed_mps[b] > _HARD_BRAKE_MPS

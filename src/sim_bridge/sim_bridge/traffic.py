@@ -71,11 +71,13 @@ def yields_now(
 @kernel
 def find_leaders(sharing: Sharing, episodes: Episodes, vehicles: Vehicles) -> None:
     """Find, where a decision is due, each vehicle's nearest one ahead on its path."""
+    running, phase = episodes.running, episodes.phase
     driving, path, s_m = vehicles.driving, vehicles.path, vehicles.s_m
+    leaders, leader_offset_m = vehicles.leader, vehicles.leader_offset_m
     low_m, high_m, offset_m = sharing.low_m, sharing.high_m, sharing.offset_m
     batch, count = driving.shape
     for b in range(batch):
-        if not episodes.running[b] or episodes.phase[b] != 0:
+        if not running[b] or phase[b] != 0:
             continue
         for i in range(count):
             p, own = path[b, i], s_m[b, i]
@@ -89,9 +91,9 @@ def find_leaders(sharing: Sharing, episodes: Episodes, vehicles: Vehicles) -> No
                 on_path = (s >= low_m[p, q]) & (s <= high_m[p, q])
                 if driving[b, j] & on_path & before & (ahead < nearest):
                     nearest, leader = ahead, j
-            vehicles.leader[b, i] = leader
+            leaders[b, i] = leader
             if leader != NOBODY:
-                vehicles.leader_offset_m[b, i] = offset_m[p, path[b, leader]]
+                leader_offset_m[b, i] = offset_m[p, path[b, leader]]
 
 
 @kernel
@@ -99,10 +101,10 @@ def follow_leaders(length_m: float, idm: Idm, episodes: Episodes, vehicles: Vehi
     """Set all accelerations from where everyone is now, as if the ego were not there."""
     s_m, speed_mps, desired_mps = vehicles.s_m, vehicles.speed_mps, vehicles.desired_speed_mps
     leader, leader_offset_m = vehicles.leader, vehicles.leader_offset_m
-    acceleration_mps2 = vehicles.acceleration_mps2
+    acceleration_mps2, running = vehicles.acceleration_mps2, episodes.running
     batch, count = s_m.shape
     for b in range(batch):
-        if not episodes.running[b]:
+        if not running[b]:
             continue
         for i in range(count):
             gap_m, leader_mps = math.inf, 0.0
@@ -137,22 +139,27 @@ def follow_egos(
 
     lengths_m: half the ego's and half a vehicle's length.
     """
-    from_m, until_m = ego_sharing.from_m, ego_sharing.until_m
-    batch, count = vehicles.path.shape
+    from_m, until_m, offset_m = ego_sharing.from_m, ego_sharing.until_m, ego_sharing.offset_m
+    running, ego_s_m, ego_speed_mps = episodes.running, episodes.ego_s_m, episodes.ego_speed_mps
+    driving, path, s_m, speed_mps = (
+        vehicles.driving,
+        vehicles.path,
+        vehicles.s_m,
+        vehicles.speed_mps,
+    )
+    follows = vehicles.follows_ego
+    batch, count = path.shape
     for b in range(batch):
-        ego_m, ego_mps = episodes.ego_s_m[b], episodes.ego_speed_mps[b]
-        if ego_m < first_zone_m or not episodes.running[b]:
+        ego_m, ego_mps = ego_s_m[b], ego_speed_mps[b]
+        if ego_m < first_zone_m or not running[b]:
             continue
         for i in range(count):
-            p = vehicles.path[b, i]
-            if ego_m < from_m[p] or ego_m > until_m[p] or not vehicles.driving[b, i]:
+            p = path[b, i]
+            if ego_m < from_m[p] or ego_m > until_m[p] or not driving[b, i]:
                 continue
-            gap_m = ego_m + ego_sharing.offset_m[p] - vehicles.s_m[b, i] - lengths_m
-            if not vehicles.follows_ego[b, i]:
-                vehicles.follows_ego[b, i] = accepts_ego(
-                    gap_m, vehicles.speed_mps[b, i], ego_mps, idm
-                )
-            if vehicles.follows_ego[b, i]:
+            gap_m = ego_m + offset_m[p] - s_m[b, i] - lengths_m
+            follows[b, i] = follows[b, i] or accepts_ego(gap_m, speed_mps[b, i], ego_mps, idm)
+            if follows[b, i]:
                 _brake_behind(vehicles, b, i, gap_m, ego_mps, idm)
 
 

@@ -19,44 +19,52 @@ HALF_PLANES = 4
 
 
 @kernel
-def _half_plane(shadow: Floats, row: int, x1: float, y1: float, x2: float, y2: float) -> None:
+def _half_plane(
+    shadows: Floats, b: int, o: int, row: int, x1: float, y1: float, x2: float, y2: float
+) -> None:
     """Store the half-plane left of the directed line from point 1 to point 2."""
     nx, ny = y1 - y2, x2 - x1
-    shadow[row, 0] = nx
-    shadow[row, 1] = ny
-    shadow[row, 2] = nx * x1 + ny * y1
+    shadows[b, o, row, 0] = nx
+    shadows[b, o, row, 1] = ny
+    shadows[b, o, row, 2] = nx * x1 + ny * y1
 
 
 @kernel
-def cast_shadow(corners: Floats, x: float, y: float, shadow: Floats) -> None:
-    """Fill the half-planes (4, 3) of the shadow that a rectangle casts from a sensor.
+def cast_shadow(
+    catalogue: Floats, side: int, k: int, x: float, y: float, shadows: Floats, b: int, o: int
+) -> None:
+    """Fill shadow (b, o) of (B, O, 4, 3): the half-planes of what a rectangle hides.
 
-    corners (4, 2) counter-clockwise; sensor at (x, y); a half-plane (nx, ny, c) holds the
-    points with nx px + ny py > c. A sensor inside the rectangle sees nothing: four times all.
+    The rectangle is (side, k) of a catalogue (2, K, 4, 2) of corners, counter-clockwise; the sensor
+    is at (x, y). A half-plane (nx, ny, c) holds the points with nx px + ny py > c. A sensor
+    inside the rectangle sees nothing: four times all.
     """
     faces = 0
     first, last = -1, -1
     # Walk over the edges so that those facing the sensor come out as one chain.
-    for k in range(4):
-        ax, ay = corners[k, 0], corners[k, 1]
-        bx, by = corners[(k + 1) % 4, 0], corners[(k + 1) % 4, 1]
+    for edge in range(4):
+        ax, ay = catalogue[side, k, edge, 0], catalogue[side, k, edge, 1]
+        bx, by = catalogue[side, k, (edge + 1) % 4, 0], catalogue[side, k, (edge + 1) % 4, 1]
         if (bx - ax) * (y - ay) - (by - ay) * (x - ax) < 0.0:
-            _half_plane(shadow, faces, ax, ay, bx, by)
+            _half_plane(shadows, b, o, faces, ax, ay, bx, by)
             faces += 1
-            if first < 0 or (last + 1) % 4 != k:
-                first = k
-            if last < 0 or (last + 1) % 4 == k:
-                last = k
+            if first < 0 or (last + 1) % 4 != edge:
+                first = edge
+            if last < 0 or (last + 1) % 4 == edge:
+                last = edge
     if faces == 0:
         for row in range(HALF_PLANES):
-            shadow[row, 0], shadow[row, 1], shadow[row, 2] = 0.0, 0.0, -1.0
+            shadows[b, o, row, 0], shadows[b, o, row, 1], shadows[b, o, row, 2] = 0.0, 0.0, -1.0
         return
     if faces == 1:
-        shadow[1, 0], shadow[1, 1], shadow[1, 2] = shadow[0, 0], shadow[0, 1], shadow[0, 2]
+        for column in range(3):
+            shadows[b, o, 1, column] = shadows[b, o, 0, column]
     # The chain runs counter-clockwise around the rectangle, clockwise as seen from the sensor.
     end = (last + 1) % 4
-    _half_plane(shadow, 2, corners[first, 0], corners[first, 1], x, y)
-    _half_plane(shadow, 3, x, y, corners[end, 0], corners[end, 1])
+    ax, ay = catalogue[side, k, first, 0], catalogue[side, k, first, 1]
+    _half_plane(shadows, b, o, 2, ax, ay, x, y)
+    ax, ay = catalogue[side, k, end, 0], catalogue[side, k, end, 1]
+    _half_plane(shadows, b, o, 3, x, y, ax, ay)
 
 
 @kernel
@@ -89,38 +97,62 @@ def point_hidden(
 
 @kernel
 def range_exit(ax: float, ay: float, dx: float, dy: float, range_m: float) -> float:
-    """Return the share at which a + t d, relative to the sensor, leaves its range; 2: never."""
-    start = ax * ax + ay * ay - range_m * range_m
-    if start > 0.0:
-        return 0.0
-    bx, by = ax + dx, ay + dy
-    if bx * bx + by * by <= range_m * range_m:
-        return 2.0
+    """Return the share of the way a + t d, relative to the sensor, at which it leaves the range.
+
+    The way begins within range and ends beyond it.
+    """
     square = dx * dx + dy * dy
     half = ax * dx + ay * dy
+    start = ax * ax + ay * ay - range_m * range_m
     return (math.sqrt(half * half - square * start) - half) / square
 
 
 @kernel
-def shadow_entry(
-    shadows: Floats, b: int, o: int, ax: float, ay: float, dx: float, dy: float
-) -> float:
-    """Return the share of the way a + t d, t in [0, 1], at which it enters a shadow; 2: never.
+def _sides(
+    shadows: Floats, b: int, o: int, x: float, y: float
+) -> tuple[float, float, float, float]:
+    """Return how far inside of each half-plane of a shadow a point is, in lengths of the normal."""
+    return (
+        shadows[b, o, 0, 0] * x + shadows[b, o, 0, 1] * y - shadows[b, o, 0, 2],
+        shadows[b, o, 1, 0] * x + shadows[b, o, 1, 1] * y - shadows[b, o, 1, 2],
+        shadows[b, o, 2, 0] * x + shadows[b, o, 2, 1] * y - shadows[b, o, 2, 2],
+        shadows[b, o, 3, 0] * x + shadows[b, o, 3, 1] * y - shadows[b, o, 3, 2],
+    )
 
-    Cyrus and Beck 1978. A way that only touches the shadow does not enter it.
+
+@kernel
+def _narrowed(enter: float, leave: float, start: float, end: float) -> tuple[float, float]:
+    """Narrow the shares of a way between which it lies in the half-planes seen so far."""
+    share = start / (start - end)
+    return (
+        max(enter, share if end > start else 0.0),
+        min(leave, share if end < start else 1.0),
+    )
+
+
+@kernel
+def first_in_shadow(
+    xy: Floats, p: int, points: int, shadows: Floats, b: int, o: int
+) -> tuple[int, float]:
+    """Return (segment, share) at which path p enters shadow o; (points, 0) if it never does.
+
+    Cyrus and Beck 1978, segment by segment. A way that only touches the shadow does not enter it.
     """
-    enter, leave = 0.0, 1.0
-    for row in range(HALF_PLANES):
-        nx, ny = shadows[b, o, row, 0], shadows[b, o, row, 1]
-        start = nx * ax + ny * ay - shadows[b, o, row, 2]
-        change = nx * dx + ny * dy
-        if start + max(change, 0.0) <= 0.0:
-            return 2.0
-        if change > 0.0:
-            enter = max(enter, -start / change)
-        elif change < 0.0:
-            leave = min(leave, -start / change)
-    return enter if enter < leave else 2.0
+    a = _sides(shadows, b, o, xy[p, 0, 0], xy[p, 0, 1])
+    for k in range(1, points):
+        z = _sides(shadows, b, o, xy[p, k, 0], xy[p, k, 1])
+        # Both ends outside of one half-plane: no point of the segment is in the shadow.
+        apart = (max(a[0], z[0]) <= 0.0) | (max(a[1], z[1]) <= 0.0)
+        apart |= (max(a[2], z[2]) <= 0.0) | (max(a[3], z[3]) <= 0.0)
+        if not apart:
+            enter, leave = _narrowed(0.0, 1.0, a[0], z[0])
+            enter, leave = _narrowed(enter, leave, a[1], z[1])
+            enter, leave = _narrowed(enter, leave, a[2], z[2])
+            enter, leave = _narrowed(enter, leave, a[3], z[3])
+            if enter < leave:
+                return k - 1, enter
+        a = z
+    return points, 0.0
 
 
 @kernel
@@ -142,12 +174,23 @@ def first_hidden(
     distance to the zone's centre; `count` shadows b of (B, O, 4, 3). A path that is seen to its
     end gives the range, also where it is shorter (as risk_dqn_planner.situation.occlusion).
     """
-    for k in range(points - 1):
-        ax, ay = xy[p, k, 0], xy[p, k, 1]
-        dx, dy = xy[p, k + 1, 0] - ax, xy[p, k + 1, 1] - ay
-        hidden = range_exit(ax - sensor_x, ay - sensor_y, dx, dy, range_m)
-        for o in range(count):
-            hidden = min(hidden, shadow_entry(shadows, b, o, ax, ay, dx, dy))
-        if hidden <= 1.0:
-            return float(distance[p, k] + hidden * (distance[p, k + 1] - distance[p, k]))
-    return range_m
+    segment, share = points, 0.0
+    ax, ay = 0.0, 0.0
+    for k in range(points):
+        x, y = xy[p, k, 0] - sensor_x, xy[p, k, 1] - sensor_y
+        if x * x + y * y > range_m * range_m:
+            if k > 0:
+                segment, share = k - 1, range_exit(ax, ay, x - ax, y - ay, range_m)
+            else:
+                segment = 0
+            break
+        ax, ay = x, y
+    for o in range(count):
+        # What is further than the nearest place found so far cannot change the result.
+        found, at = first_in_shadow(xy, p, min(segment + 2, points), shadows, b, o)
+        if found < segment or (found == segment and at < share):
+            segment, share = found, at
+    if segment == points:
+        return range_m
+    step = distance[p, segment + 1] - distance[p, segment]
+    return float(distance[p, segment] + share * step)

@@ -32,10 +32,10 @@ def test_an_obstacle_stands_in_the_corner_of_both_roads_as_far_off_as_its_gaps_s
     crossing_model: IntersectionModel, side: int, sign: float
 ):
     box = boxes(crossing_model, fixed(), side)[0]
-    # 1 m off the ego's lane (x = 1.75) and off the crossing lane (y = -1.75), within one move
-    # of half a metre.
+    # 1 m off the ego's lane (x = 1.75) and off the crossing lane (y = -1.75), but for the last
+    # step of placing, 3 cm.
     assert box.distance(EGO_ROAD) == pytest.approx(1.0)
-    assert 1.0 <= box.distance(CROSS_ROADS) < 1.5
+    assert box.distance(CROSS_ROADS) == pytest.approx(1.0, abs=0.04)
     assert sign * box.centroid.x == pytest.approx(1.75 + 1.0 + 2.0)
     assert box.centroid.y < -1.75
     assert box.area == pytest.approx(24.0)
@@ -53,7 +53,7 @@ def test_no_placement_of_a_scenario_comes_nearer_than_its_least_gaps(
         assert box.distance(EGO_ROAD) >= config.gap_ego_m.low - 1e-5
         assert box.distance(CROSS_ROADS) >= config.gap_cross_m.low - 1e-5
         # No further than its greatest gap and what placing in steps costs.
-        assert box.distance(CROSS_ROADS) <= config.gap_cross_m.high + 0.5
+        assert box.distance(CROSS_ROADS) <= config.gap_cross_m.high + 0.04
 
 
 def test_corners_run_counter_clockwise_on_both_sides(crossing_model: IntersectionModel):
@@ -65,7 +65,7 @@ def test_obstacles_keep_clear_of_further_roads(crossing_model: IntersectionModel
     # The lane of oncoming traffic, left of the ego's.
     oncoming = np.array([(-5.25, -100.0), (-1.75, -100.0), (-1.75, 60.0), (-5.25, 60.0)])
     box = boxes(crossing_model, fixed(), LEFT, keep_out=[oncoming])[0]
-    assert 1.0 <= box.distance(shapely.Polygon(oncoming)) < 1.5
+    assert box.distance(shapely.Polygon(oncoming)) == pytest.approx(1.0, abs=0.04)
     assert box.centroid.x < -5.25
 
 

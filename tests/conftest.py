@@ -12,10 +12,12 @@ sys.path.insert(0, str(Path(__file__).parent))
 from planner_driver import PlannerDriver
 
 from risk_dqn_planner.intersection.model import IntersectionModel
-from sim_bridge.environment.place import Place, load_place
+from risk_dqn_planner.map.loader import load_map
+from sim_bridge.ros.building import SimulationShelf
 from sim_bridge.ros.node_group import NodeGroup
 from sim_bridge.ros.run_settings import RunSettings, own_map_settings
 from sim_bridge.ros.session import ros_session
+from sim_bridge.simulation import Simulation
 
 
 @pytest.fixture(scope="session")
@@ -24,13 +26,15 @@ def settings() -> RunSettings:
 
 
 @pytest.fixture(scope="session")
-def place(settings: RunSettings) -> Place:
-    return load_place(settings.map_name)
+def simulation(settings: RunSettings) -> Simulation:
+    """What the simulator node simulates, in this process."""
+    road_map = load_map(settings.map_file, settings.origin, settings.projector)
+    return SimulationShelf(road_map, settings.route).get(settings.scenario)
 
 
 @pytest.fixture(scope="session")
-def model(place: Place) -> IntersectionModel:
-    return place.model
+def model(simulation: Simulation) -> IntersectionModel:
+    return simulation.model
 
 
 @pytest.fixture(scope="module")

@@ -18,11 +18,10 @@ from rclpy.serialization import deserialize_message
 from risk_dqn_planner.decision import Action
 from risk_dqn_planner.policies.loading import load_policy
 from risk_dqn_planner.ros.conversions import to_ns
-from sim_bridge.environment.place import Place
 from sim_bridge.ros import topics
 from sim_bridge.ros.recording import Bag, read_bag
 from sim_bridge.ros.run_settings import RunSettings
-from sim_bridge.scenario import load_scenario
+from sim_bridge.simulation import Simulation
 
 pytestmark = pytest.mark.ros
 
@@ -132,9 +131,8 @@ def test_the_same_seed_gives_the_same_decisions_and_inputs_again(run: Run, tmp_p
 
 
 def test_the_nodes_decide_as_the_policy_does_in_the_batched_simulation(
-    run: Run, place: Place, settings: RunSettings
+    run: Run, simulation: Simulation, settings: RunSettings
 ) -> None:
-    simulation = place.simulation(load_scenario(settings.scenario), 1)
     simulation.reset([SEED])
     policy = load_policy(settings.policy)
     expected, restart = [], np.array([True])

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from risk_dqn_planner.errors import ConfigurationError
 from risk_dqn_planner.intersection.builder import build_intersection
+from risk_dqn_planner.intersection.config import IntersectionConfig
 from risk_dqn_planner.intersection.model import IntersectionModel
 from risk_dqn_planner.map.loader import MapOrigin, RoadMap, load_map
 from sim_bridge.maps import shipped_map
@@ -51,8 +52,15 @@ def load_place(
     return place_on(map_name, load_map(path, origin, projector), route)
 
 
-def place_on(map_name: str, road_map: RoadMap, route: Sequence[int]) -> Place:
+def place_on(
+    map_name: str,
+    road_map: RoadMap,
+    route: Sequence[int],
+    config: IntersectionConfig | None = None,
+) -> Place:
     """Take the intersection along a route of a loaded map.
+
+    config: a scenario whose sensor sees further than 70 m needs lanes of that length.
 
     Raises:
         RouteError: the route does not fit the map.
@@ -61,4 +69,5 @@ def place_on(map_name: str, road_map: RoadMap, route: Sequence[int]) -> Place:
         np.array([(point.x, point.y) for point in lanelet.polygon2d()])
         for lanelet in road_map.lanelet_map.laneletLayer
     )
-    return Place(map_name, build_intersection(road_map, route), outlines)
+    model = build_intersection(road_map, route, config or IntersectionConfig())
+    return Place(map_name, model, outlines)

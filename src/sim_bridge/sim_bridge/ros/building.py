@@ -1,28 +1,37 @@
 # SPDX-License-Identifier: Apache-2.0
 """Simulations for the node: a scenario is laid out when it is first asked for, then kept."""
 
+from collections.abc import Sequence
+
 from risk_dqn_planner.decision import Action
-from sim_bridge.environment.place import Place
+from risk_dqn_planner.intersection.config import IntersectionConfig
+from risk_dqn_planner.map.loader import RoadMap
+from sim_bridge.environment.place import place_on
 from sim_bridge.scenario import load_scenario
 from sim_bridge.simulation import Simulation
 
 
 class SimulationShelf:
-    """Simulations at one place by the name of their scenario."""
+    """Simulations on one route by the name of their scenario."""
 
-    def __init__(self, place: Place) -> None:
-        self._place = place
+    def __init__(self, road_map: RoadMap, route: Sequence[int]) -> None:
+        self._road_map = road_map
+        self._route = tuple(route)
         self._simulations: dict[str, Simulation] = {}
 
     def get(self, scenario_name: str) -> Simulation:
         """Return the simulation of a scenario.
 
         Raises:
-            ScenarioError: there is no such scenario, or it does not fit the place.
-            NoConflictError: the route meets no intersecting lane.
+            ScenarioError: there is no such scenario, or it does not fit the route.
+            RouteError: the route does not fit the map or meets no intersecting lane.
         """
         if scenario_name not in self._simulations:
-            simulation = self._place.simulation(load_scenario(scenario_name), 1)
+            scenario = load_scenario(scenario_name)
+            # Lanes as long as the situation node's, which knows how far the sensor sees.
+            config = IntersectionConfig(sensor_range_m=scenario.sensor.range_m)
+            place = place_on(str(self._road_map.path), self._road_map, self._route, config)
+            simulation = place.simulation(scenario, 1)
             _compile(simulation)
             self._simulations[scenario_name] = simulation
         return self._simulations[scenario_name]

@@ -19,13 +19,21 @@ from sim_bridge.ros.summary import episode_result
 from sim_bridge.ros.topics import DECISION, INPUTS
 
 _TOPICS = (*INPUTS, DECISION)
-_DEFAULT_SEED = 4
+_DEFAULT_SEED = 0
+_KEPT_AFTER_DECISION_NS = (0, 300_000_000)
 
 
-def at_decisions(messages: Sequence[Stored]) -> list[Stored]:
-    """Keep the inputs that decisions were taken on, a fifth of all, and the decisions."""
+def thinned(messages: Sequence[Stored]) -> list[Stored]:
+    """Keep the decisions and two of five inputs, among them those that decisions were taken on.
+
+    The others keep a planner that listens in real time from calling its inputs stale.
+    """
     names = {topic.name for topic in _TOPICS}
-    return [m for m in messages if m.topic in names and m.stamp_ns % DECISION_PERIOD_NS == 0]
+    return [
+        m
+        for m in messages
+        if m.topic in names and m.stamp_ns % DECISION_PERIOD_NS in _KEPT_AFTER_DECISION_NS
+    ]
 
 
 def record(settings: RunSettings, seed: int, target: Path) -> str:
@@ -39,7 +47,7 @@ def record(settings: RunSettings, seed: int, target: Path) -> str:
         with closing(drive(settings, [seed], 0.0, Path(folder) / "log")) as episodes:
             episode = next(episodes)
             with BagWriter(new, _TOPICS, {**settings.notes(), "seed": str(seed)}) as bag:
-                bag.write(at_decisions(episode.messages))
+                bag.write(thinned(episode.messages))
         shutil.rmtree(target, ignore_errors=True)
         target.parent.mkdir(parents=True, exist_ok=True)
         shutil.move(new, target)

@@ -11,6 +11,7 @@ from risk_dqn_planner.map.loader import MapOrigin
 from sim_bridge.maps import map_names, shipped_map
 from sim_bridge.ros.process import NodeCommand, ParameterValue
 from sim_bridge.ros.topics import remappings
+from sim_bridge.scenario import load_scenario
 
 DEFAULT_MAP = "four_way"
 DEFAULT_PROJECTOR = "utm"
@@ -56,8 +57,17 @@ class RunSettings:
         }
 
     def planner_commands(self) -> list[NodeCommand]:
-        """Situation and policy node, in simulated time."""
-        situation = {**self._map_parameters(), **self.overrides}
+        """Situation and policy node, in simulated time.
+
+        Raises:
+            ScenarioError: there is no such scenario.
+        """
+        sensor_range_m = load_scenario(self.scenario).sensor.range_m
+        situation = {
+            **self._map_parameters(),
+            "sensor_range_m": sensor_range_m,
+            **self.overrides,
+        }
         policy = {"use_sim_time": True, "policy": self.policy, **self.overrides}
         package = "risk_dqn_planner"
         return [

@@ -17,11 +17,10 @@ from risk_dqn_planner.errors import ConfigurationError, PlannerError
 from risk_dqn_planner.ros.clock import steady_timer
 from risk_dqn_planner.ros.main import run
 from risk_dqn_planner.ros.parameters import MapParameters, declare
-from sim_bridge.environment.place import place_on
 from sim_bridge.ros.building import SimulationShelf
 from sim_bridge.ros.episodes import EpisodePlayer
-from sim_bridge.ros.frames import FramePublisher
 from sim_bridge.ros.pacing import LockStep, PlannerLink, RealTime, WallPace
+from sim_bridge.ros.publishing import FramePublisher
 from sim_bridge.simulation import Simulation
 
 _WATCH_PERIOD_S = 0.2
@@ -93,8 +92,7 @@ class SimulatorNode(Node):
         super().__init__("simulator")
         maps = declare(self, MapParameters)
         self._config = declare(self, SimulatorParameters)
-        place = place_on(maps.map_file, maps.load(), self._declare_route())
-        self._shelf = SimulationShelf(place)
+        self._shelf = SimulationShelf(maps.load(), self._declare_route())
         first = self._shelf.get(self._config.scenario)
         self._publisher = FramePublisher(self, maps.map_frame)
         self._publisher.publish_route(first, 0)

@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: Apache-2.0
+import argparse
+
+import pytest
+
+from risk_dqn_planner.errors import BagError, ConfigurationError, MapFileError
+from sim_bridge.ros.run_settings import (
+    RunSettings,
+    add_run_arguments,
+    from_notes,
+    own_map_settings,
+    run_settings,
+)
+
+
+def parse(*options: str) -> RunSettings:
+    parser = argparse.ArgumentParser()
+    add_run_arguments(parser)
+    return run_settings(parser.parse_args(options))
+
+
+def test_an_own_map_brings_its_file_route_and_origin() -> None:
+    settings = parse("--map", "t_junction")
+    assert settings.map_file.name == "t_junction.osm"
+    assert settings.route == (1, 7, 4)
+    assert str(settings.origin) == "49,8.4"
+
+
+def test_route_and_origin_of_an_own_map_can_be_replaced() -> None:
+    settings = parse("--route", "5,-6,9000000000000000000", "--origin=48.5,-9.25")
+    assert settings.route == (5, -6, 9000000000000000000)
+    assert (settings.origin.latitude_deg, settings.origin.longitude_deg) == (48.5, -9.25)
+
+
+@pytest.mark.parametrize(
+    ("options", "error", "complaint"),
+    [
+        (["--map", "x.osm", "--origin", "1,2"], ConfigurationError, "its route must be given"),
+        (["--map", "x.osm", "--route", "1,2"], ConfigurationError, "its origin must be given"),
+        (["--map", "x"], MapFileError, "no map 'x'"),
+        (["--route", "1;2"], ConfigurationError, "route is '1;2'"),
+        (["--origin", "north"], ConfigurationError, "'north'"),
+    ],
+)
+def test_a_wrong_option_is_named(
+    options: list[str], error: type[Exception], complaint: str
+) -> None:
+    with pytest.raises(error, match=complaint):
+        parse(*options)
+
+
+def test_a_bag_s_notes_give_the_settings_back() -> None:
+    settings = parse("--origin", "49.00000001,8.4", "--scenario", "base", "--policy", "always_slow")
+    assert from_notes(settings.map_file, settings.notes(), {}) == settings
+
+
+def test_a_bag_without_notes_cannot_be_replayed() -> None:
+    settings = own_map_settings()
+    notes = {key: value for key, value in settings.notes().items() if key != "policy"}
+    with pytest.raises(BagError, match="does not say with which policy"):
+        from_notes(settings.map_file, notes, {})
+    with pytest.raises(BagError, match="no map 'atlantis'"):
+        from_notes(settings.map_file, settings.notes() | {"map": "atlantis"}, {})
+
+
+def test_nodes_get_their_parameters_and_topics_on_the_command_line() -> None:
+    settings = own_map_settings()
+    simulator = settings.simulator_command(2.0).arguments()
+    assert "route:=[1, 9, 4]" in simulator
+    assert "real_time_factor:=2.0" in simulator
+    assert "lockstep:=true" in simulator
+    assert "~/output/objects:=/objects" in simulator
+    situation, policy = (command.arguments() for command in settings.planner_commands())
+    assert "~/input/objects:=/objects" in situation
+    assert "~/output/situation:=/situation" in situation
+    assert "~/input/situation:=/situation" in policy
+    assert 'policy:="rule_based"' in policy

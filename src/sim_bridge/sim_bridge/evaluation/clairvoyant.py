@@ -1,0 +1,203 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The exact optimum of an episode with everything known: what no policy can beat (SPEC 4).
+
+It exists where traffic does not react to the ego: then the episode's traffic is one film, and
+the fastest way to the goal a shortest path through it. The ego's three actions reach a finite
+set of states, so nothing is discretised; see search.py.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from risk_dqn_planner.errors import ScenarioError
+from risk_dqn_planner.policies.base import Action, Decisions, Reason
+from risk_dqn_planner.policies.fingerprint import fingerprint
+from risk_dqn_planner.situation.situations import Booleans, Integers, Situations
+from sim_bridge.environment.seeds import Seeds
+from sim_bridge.evaluation.bounds import Bounds, Rules, lower_bounds, no_bounds, speeds_from
+from sim_bridge.evaluation.search import GAVE_UP, IMPOSSIBLE, fastest_way
+from sim_bridge.simulation import Simulation
+from sim_bridge.state import Vehicles
+
+NAME = "clairvoyant"
+
+# Equal states differ by rounding only.
+_SAME_M = 1e-6
+# A first try without knowledge of the traffic solves most episodes.
+_EASY_STATES = 20_000
+# Else states within this are taken for one, which gives a way that is good but perhaps not best.
+_COARSE_M = 0.1
+MOST_STATES = 500_000
+_FAR_BEHIND_M = -1e6
+
+
+class Optima(NamedTuple):
+    """The fastest ways through N episodes of at most D decisions.
+
+    steps (N,): inner steps to the goal, search.IMPOSSIBLE where there is no way within the time
+    limit. actions (N, D): Action, Stop beyond the end and where there is no way.
+    at_least (N,): no way is shorter than so many steps. Equal to `steps`, and so a proof, but
+    for a few episodes in dense traffic, whose proof would need more than MOST_STATES states.
+    """
+
+    steps: Integers
+    actions: Integers
+    at_least: Integers
+
+    @property
+    def proven(self) -> Booleans:
+        """Whether the way is the very fastest, or there is none for certain (N,)."""
+        return np.asarray(self.steps == self.at_least)
+
+
+def require_indifferent(simulation: Simulation) -> None:
+    """Refuse scenarios whose traffic reacts to the ego.
+
+    Raises:
+        ScenarioError: a lane merges, where followers make room, or a share of vehicles yields.
+    """
+    if simulation.scenario.traffic.yielding_share > 0.0:
+        reason = f"in scenario {simulation.scenario.name} vehicles yield to the ego"
+    elif simulation.world.lanes.merging.any():
+        lane = simulation.world.lanes.id[simulation.world.lanes.merging][0]
+        reason = f"on merging lane {lane} vehicles follow the ego"
+    else:
+        return
+    raise ScenarioError(f"{reason}, expected traffic that does not react: no optimum is computed")
+
+
+def film(simulation: Simulation, seeds: Seeds) -> Vehicles:
+    """Return the traffic of B episodes after each of T inner steps, all (B, T, N).
+
+    The simulation is left at the time limit. Only driving, path and s_m are filmed.
+    """
+    simulation.reset(seeds)
+    episodes, vehicles, _ = simulation.state
+    # Far away from everything the ego cannot end an episode before its time.
+    episodes.ego_s_m[:] = _FAR_BEHIND_M
+    steps = simulation.settings.limit_steps
+    shape = (simulation.batch, steps, vehicles.driving.shape[1])
+    driving = np.zeros(shape, dtype=np.bool_)
+    path, s_m = np.zeros(shape, dtype=np.int64), np.zeros(shape)
+    stop = np.full(simulation.batch, Action.STOP)
+    for step in range(steps):
+        simulation.inner_step(stop)
+        driving[:, step] = vehicles.driving
+        path[:, step] = vehicles.path
+        s_m[:, step] = vehicles.s_m
+    return vehicles._replace(driving=driving, path=path, s_m=s_m)
+
+
+def optima(simulation: Simulation, seeds: Seeds, most_states: int = MOST_STATES) -> Optima:
+    """Return the fastest ways through the episodes of seeds (B,), B the simulation's batch.
+
+    Raises:
+        ScenarioError: the traffic reacts to the ego.
+    """
+    require_indifferent(simulation)
+    simulation.reset(seeds)
+    start_m = simulation.state.episodes.ego_s_m.copy()
+    start_mps = simulation.state.episodes.ego_speed_mps.copy()
+    traffic = film(simulation, seeds)
+    settings = simulation.settings
+    decisions = -(-settings.limit_steps // settings.decision_steps)
+    batch = simulation.batch
+    result = Optima(
+        steps=np.full(batch, IMPOSSIBLE, dtype=np.int64),
+        actions=np.full((batch, decisions), int(Action.STOP), dtype=np.int64),
+        at_least=np.full(batch, IMPOSSIBLE, dtype=np.int64),
+    )
+    for b in range(batch):
+        episode = _Episode(simulation, _frame(traffic, b), start_m[b], start_mps[b])
+        result.steps[b], result.at_least[b] = episode.solve(most_states, result.actions[b])
+    return result
+
+
+def _frame(traffic: Vehicles, episode: int) -> Vehicles:
+    """Return the film (T, N) of one episode."""
+    return traffic._replace(
+        driving=traffic.driving[episode], path=traffic.path[episode], s_m=traffic.s_m[episode]
+    )
+
+
+class _Episode:
+    """One search after the other, each with more effort than the one before."""
+
+    def __init__(
+        self, simulation: Simulation, traffic: Vehicles, start_m: float, start_mps: float
+    ) -> None:
+        self._world, self._settings = simulation.world, simulation.settings
+        self._rules = Rules(
+            step_s=self._settings.step_s,
+            decision_steps=self._settings.decision_steps,
+            limit_steps=self._settings.limit_steps,
+            goal_m=simulation.world.ego.goal_m,
+        )
+        self._speeds = speeds_from(self._settings.ego, self._rules, start_mps)
+        self._traffic, self._start_m = traffic, start_m
+
+    def solve(self, most_states: int, actions: Integers) -> tuple[int, int]:
+        """Return inner steps to the goal and a lower bound of them, filling in actions (D,)."""
+        limit, nothing = self._rules.limit_steps, no_bounds()
+        steps = self._search(nothing, limit, _SAME_M, min(_EASY_STATES, most_states), actions)
+        if steps != GAVE_UP:
+            return steps, steps
+        steps = self._search(nothing, limit, _COARSE_M, most_states, actions)
+        found = steps >= 0
+        latest = steps - 1 if found else limit
+        bounds = lower_bounds(
+            self._world.ego, self._world.paths, self._rules, self._speeds, self._traffic,
+            self._start_m, latest,
+        )  # fmt: skip
+        faster = self._search(bounds, latest, _SAME_M, most_states, actions)
+        if faster >= 0:
+            return faster, faster
+        steps = steps if found else IMPOSSIBLE
+        at_least = int(bounds.least[0, 0, 0]) if faster == GAVE_UP else steps
+        return steps, at_least
+
+    def _search(
+        self, bounds: Bounds, latest: int, merge_m: float, most_states: int, actions: Integers
+    ) -> int:
+        steps: int = fastest_way(
+            self._world.ego, self._world.paths, self._settings.ego, self._rules, self._speeds,
+            bounds, self._traffic, self._start_m, latest, merge_m, most_states, actions,
+        )  # fmt: skip
+        return steps
+
+
+class ClairvoyantPolicy:
+    """Drives the optima of the episodes that the simulation runs next.
+
+    It looks at no situation: row b carries out actions (B, D) one after the other.
+    """
+
+    name = NAME
+
+    def __init__(self, actions: NDArray[np.int64]) -> None:
+        self._actions = actions
+        self._done = 0
+
+    @property
+    def hash(self) -> str:
+        """SHA-256 of the name: there is only one optimum."""
+        return fingerprint({"policy": self.name})
+
+    def decide(self, situations: Situations, restart: Booleans) -> Decisions:  # noqa: ARG002
+        """Decide the next action of each row, and Stop once they are used up."""
+        batch, known = self._actions.shape
+        action = np.full(batch, int(Action.STOP), dtype=np.int64)
+        if self._done < known:
+            action[:] = self._actions[:, self._done]
+        self._done += 1
+        unknown = np.full((batch, len(Action)), np.nan)
+        return Decisions(
+            action=action,
+            q_values=unknown,
+            action_risks=unknown.copy(),
+            reason=np.full(batch, Reason.FIXED, dtype=np.int64),
+            critical_vehicle=np.full(batch, -1),
+            critical_lane=np.full(batch, -1),
+        )

@@ -57,6 +57,11 @@ class BatchEnvironment:
         return self._simulation.batch
 
     @property
+    def simulation(self) -> Simulation:
+        """The simulation behind, to look at."""
+        return self._simulation
+
+    @property
     def features(self) -> int:
         """How many numbers a state has."""
         return int(self._states[0].size)

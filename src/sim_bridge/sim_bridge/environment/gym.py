@@ -23,6 +23,8 @@ from sim_bridge.environment.interface import EnvironmentStep, Outcome
 from sim_bridge.environment.place import load_place
 from sim_bridge.environment.rewards import reward_named
 from sim_bridge.environment.seeds import TRAINING_SEEDS
+from sim_bridge.environment.snapshot import snapshot
+from sim_bridge.render import frame_image
 from sim_bridge.scenario import load_scenario
 
 
@@ -72,6 +74,7 @@ class OccludedIntersectionEnv(gymnasium.Env[NDArray[np.float32], np.int64]):
             raise ConfigurationError(f"render_mode is {render_mode!r}, expected None or rgb_array")
         self.render_mode = render_mode
         self._batch = _build(map, scenario, reward, 1)
+        self._action: Action | None = None
         self.observation_space = _observation_space(self._batch)
         self.action_space = spaces.Discrete(len(Action))
 
@@ -80,6 +83,7 @@ class OccludedIntersectionEnv(gymnasium.Env[NDArray[np.float32], np.int64]):
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
         """Begin episode `seed`, or the next one."""
         super().reset(seed=seed, options=options)
+        self._action = None
         if seed is None:
             seed = int(self.np_random.integers(TRAINING_SEEDS.start, TRAINING_SEEDS.stop))
         return self._batch.reset(np.array([seed]))[0].copy(), {"episode_seed": seed}
@@ -88,6 +92,7 @@ class OccludedIntersectionEnv(gymnasium.Env[NDArray[np.float32], np.int64]):
         self, action: np.int64
     ) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
         """Take one action for 0.5 s."""
+        self._action = Action(int(action))
         step = self._batch.step(np.array([action], dtype=np.int64))
         terminated, truncated = _ends(step)
         ended = bool(terminated[0] or truncated[0])
@@ -99,6 +104,13 @@ class OccludedIntersectionEnv(gymnasium.Env[NDArray[np.float32], np.int64]):
             bool(truncated[0]),
             info,
         )
+
+    def render(self) -> NDArray[np.uint8] | None:
+        """Return the view from above (480, 480, 3), if render_mode asks for it."""
+        if self.render_mode is None:
+            return None
+        simulation = self._batch.simulation
+        return frame_image(simulation.model, snapshot(simulation, 0, self._action))
 
 
 class OccludedIntersectionVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.int64], Any]):

@@ -19,7 +19,7 @@ def test_passes_gymnasiums_own_check() -> None:
 
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        check_env(gymnasium.make(ID).unwrapped, skip_render_check=True)
+        check_env(gymnasium.make(ID, render_mode="rgb_array").unwrapped)
 
 
 def test_passes_the_check_of_stable_baselines3() -> None:
@@ -51,6 +51,17 @@ def test_time_limit_truncates_and_goal_or_collision_terminates() -> None:
         assert not any(one.step(0)[2:4])
     *_, terminated, truncated, info = one.step(0)
     assert (terminated, truncated, info) == (False, True, {"outcome": "timeout"})
+
+
+def test_renders_the_view_from_above() -> None:
+    one = gymnasium.make(ID, render_mode="rgb_array")
+    one.reset(seed=1)
+    before = one.render()
+    assert before.shape == (480, 480, 3)
+    assert before.dtype == np.uint8
+    for _ in range(6):
+        one.step(2)
+    assert (one.render() != before).any()
 
 
 def test_unknown_names_are_refused() -> None:

@@ -13,8 +13,8 @@ from sim_bridge.path_geometry import table_pose
 from sim_bridge.randomness import NOISE_STREAM, random_normal
 from sim_bridge.settings import Settings
 from sim_bridge.sight_lines import SightLines
-from sim_bridge.state import NOBODY, Episodes, Vehicles
-from sim_bridge.visibility import HALF_PLANES, cast_shadow, first_hidden, point_hidden
+from sim_bridge.state import Episodes, Vehicles
+from sim_bridge.visibility import HALF_PLANES, cast_shadows, first_hidden, point_hidden
 from sim_bridge.world import EgoLane, World
 
 # Errors of perceived speeds are numbered by inner step and vehicle id.
@@ -82,12 +82,8 @@ def look(ego: EgoLane, corners: Floats, offset_m: float, episodes: Episodes, vie
         if offset_m != 0.0:
             x += offset_m * math.cos(heading)
             y += offset_m * math.sin(heading)
-        count = 0
-        for o in range(obstacle.shape[1]):
-            if obstacle[b, o] != NOBODY:
-                cast_shadow(corners, o % 2, obstacle[b, o], x, y, shadows, b, count)
-                count += 1
-        x_m[b], y_m[b], cast[b] = x, y, count
+        x_m[b], y_m[b] = x, y
+        cast[b] = cast_shadows(corners, obstacle, b, x, y, shadows, b)
 
 
 @kernel

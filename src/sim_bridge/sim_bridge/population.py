@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from risk_dqn_planner.compiled import kernel
-from risk_dqn_planner.situation.situations import Booleans, Integers
+from risk_dqn_planner.situation.situations import Booleans, Floats, Integers
 from sim_bridge.path_geometry import table_pose
 from sim_bridge.randomness import (
     COUNT_STREAM,
@@ -29,7 +29,8 @@ from sim_bridge.state import (
     SimulationState,
     Vehicles,
 )
-from sim_bridge.world import Lanes, Paths
+from sim_bridge.visibility import HALF_PLANES, cast_shadows, point_hidden
+from sim_bridge.world import EgoLane, Lanes, Paths
 
 # How often a place is drawn for a vehicle before it is left to come in from upstream.
 _ATTEMPTS = 30
@@ -124,29 +125,70 @@ def place(
 
 
 @kernel
+def entry_in_sight(
+    ego: EgoLane,
+    paths: Paths,
+    corners: Floats,
+    settings: Settings,
+    episodes: Episodes,
+    b: int,
+    p: int,
+    shadows: Floats,
+) -> bool:
+    """Tell whether the ego sees where vehicles enter on path p.
+
+    corners (2, K, 4, 2): catalogue of the obstacles; shadows (1, O, 4, 3): memory to work in.
+    """
+    x, y, _ = table_pose(paths.table, p, 0.0)
+    sensor_x, sensor_y, heading = table_pose(ego.table, 0, episodes.ego_s_m[b])
+    sensor_x += settings.sensor_offset_m * math.cos(heading)
+    sensor_y += settings.sensor_offset_m * math.sin(heading)
+    count = cast_shadows(corners, episodes.obstacle, b, sensor_x, sensor_y, shadows, 0)
+    range_m = settings.sensor_range_m
+    return not point_hidden(x, y, sensor_x, sensor_y, range_m, shadows, 0, count)
+
+
+@kernel
 def come_and_go(
+    ego: EgoLane,
     paths: Paths,
     lanes: Lanes,
     sharing: Sharing,
+    corners: Floats,
     settings: Settings,
     episodes: Episodes,
     vehicles: Vehicles,
 ) -> None:
-    """Where a decision is due, replace vehicles that have left and let waiting ones in."""
+    """Where a decision is due, replace vehicles that have left and let waiting ones in.
+
+    Nobody appears out of nothing: an entry within the sensor's range must be out of sight.
+    Notes whether leaders have to be found anew. corners (2, K, 4, 2): the obstacles' catalogue.
+    """
     driving, waiting, path, s_m = vehicles.driving, vehicles.waiting, vehicles.path, vehicles.s_m
-    running, phase, length_m = episodes.running, episodes.phase, paths.length_m
+    running, phase, leaders_due = episodes.running, episodes.phase, episodes.leaders_due
+    length_m, entry_is_far = paths.length_m, paths.entry_is_far
+    low_m, high_m = sharing.change_low_m, sharing.change_high_m
     draws, gap_m = settings.draws, settings.idm.standstill_gap_m
+    shadows = np.empty((1, episodes.obstacle.shape[1], HALF_PLANES, 3))
     batch, count = driving.shape
     for b in range(batch):
         if not running[b] or phase[b] != 0:
             continue
         for i in range(count):
-            if driving[b, i] and s_m[b, i] > length_m[path[b, i]]:
+            p, s = path[b, i], s_m[b, i]
+            leaders_due[b] |= (s >= low_m[p]) & (s <= high_m[p])
+            if driving[b, i] and s > length_m[p]:
                 driving[b, i] = False
+                leaders_due[b] = True
                 if draws.respawn:
                     choose_vehicle(paths, lanes, draws, episodes, vehicles, b, i)
-            if waiting[b, i]:
-                place(paths, sharing, vehicles, b, i, 0.0, gap_m, draws.headway_s)
+            p = path[b, i]
+            if not waiting[b, i] or (
+                not entry_is_far[p]
+                and entry_in_sight(ego, paths, corners, settings, episodes, b, p, shadows)
+            ):
+                continue
+            leaders_due[b] |= place(paths, sharing, vehicles, b, i, 0.0, gap_m, draws.headway_s)
 
 
 @kernel
@@ -231,6 +273,7 @@ def start_episodes(
         episodes.reached_goal[b] = False
         episodes.collided[b] = False
         episodes.timed_out[b] = False
+        episodes.leaders_due[b] = True
         for o in range(episodes.obstacle.shape[1]):
             count = obstacle_count[o % 2]
             chosen = random_index(seeds[b], OBSTACLE_STREAM, o, max(count, 1))

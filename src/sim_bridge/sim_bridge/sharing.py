@@ -17,17 +17,23 @@ from sim_bridge.path_geometry import Shared, cut, shared_stretch
 # Vehicles on joining branches take each other for leaders from so far before the join.
 JOIN_VIEW_M = 15.0
 _END_M = 1.0
+# No vehicle drives further than this between two decisions.
+_PER_DECISION_M = 10.0
 
 
 class Sharing(NamedTuple):
     """Row p, column q, all (P, P): vehicle at s on path q is on or near path p.
 
     It is so for low_m <= s <= high_m (none: infinity and minus infinity), at s + offset_m on p.
+    change_low_m, change_high_m (P,): only where a vehicle is between them on its path can it
+    change who follows whom, but by coming or leaving: at joins and forks.
     """
 
     low_m: Floats
     high_m: Floats
     offset_m: Floats
+    change_low_m: Floats
+    change_high_m: Floats
 
 
 class EgoSharing(NamedTuple):
@@ -103,7 +109,11 @@ def sharing(lines: list[Polyline], near_m: float) -> Sharing:
     """Compare all pairs of lines; vehicles within `near_m` of a forking line count as on it."""
     count = len(lines)
     table = Sharing(
-        np.full((count, count), np.inf), np.full((count, count), -np.inf), np.zeros((count, count))
+        low_m=np.full((count, count), np.inf),
+        high_m=np.full((count, count), -np.inf),
+        offset_m=np.zeros((count, count)),
+        change_low_m=np.full(count, np.inf),
+        change_high_m=np.full(count, -np.inf),
     )
     for p, line in enumerate(lines):
         for q, other in enumerate(lines):
@@ -112,8 +122,16 @@ def sharing(lines: list[Polyline], near_m: float) -> Sharing:
                 continue
             stretch = shared_stretch(line, other, near_m)
             if stretch is not None:
-                table.low_m[p, q], table.high_m[p, q] = _interval(stretch, line, other)
+                low, high = _interval(stretch, line, other)
+                table.low_m[p, q], table.high_m[p, q] = low, high
                 table.offset_m[p, q] = stretch.offset_m
+                # From the join's view to the join, from the fork to where it is left behind.
+                changes = ([low, stretch.low_m] if low > -np.inf else []) + (
+                    [stretch.high_m, high] if high < np.inf else []
+                )
+                for s in changes:
+                    table.change_low_m[q] = min(table.change_low_m[q], s - _PER_DECISION_M)
+                    table.change_high_m[q] = max(table.change_high_m[q], s + _PER_DECISION_M)
     return table
 
 

@@ -153,6 +153,7 @@ class Simulation:
             world.lanes,
             world.sharing,
             world.ego_sharing,
+            world.obstacles.corners,
             self.settings,
             self.state,
             given,

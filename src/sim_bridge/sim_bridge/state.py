@@ -21,7 +21,7 @@ class Episodes(NamedTuple):
     ego_s_m (B,): along the ego's path; ego_step_m (B,): moved in the last inner step;
     ego_speed_mps (B,).
     obstacle (B, O): index into the catalogue of the left (even places) or the right side, -1 none.
-    next_id (B,): id of the next vehicle.
+    next_id (B,): id of the next vehicle. leaders_due (B,): who follows whom may have changed.
     """
 
     seed: NDArray[np.uint64]
@@ -36,6 +36,7 @@ class Episodes(NamedTuple):
     ego_speed_mps: Floats
     obstacle: Integers
     next_id: Integers
+    leaders_due: Booleans
 
 
 class Vehicles(NamedTuple):
@@ -115,6 +116,7 @@ def empty_state(batch: int, vehicles: int, obstacles: int, lanes: int) -> Simula
         ego_speed_mps=np.zeros(batch),
         obstacle=np.full((batch, obstacles), NOBODY, dtype=np.int64),
         next_id=integers(1),
+        leaders_due=booleans(),
     )
     counts = Counts(
         start_s_m=np.zeros(batch),

@@ -30,17 +30,21 @@ def advance(
     lanes: Lanes,
     sharing: Sharing,
     ego_sharing: EgoSharing,
+    corners: Floats,
     settings: Settings,
     state: SimulationState,
     actions: Integers,
     steps: int,
 ) -> None:
-    """Take all running episodes `steps` inner steps further under their actions (B,)."""
+    """Take all running episodes `steps` inner steps further under their actions (B,).
+
+    corners (2, K, 4, 2): catalogue of the obstacles.
+    """
     episodes, vehicles, counts = state.episodes, state.vehicles, state.counts
     idm, first_zone_m = settings.idm, ego.first_zone_m
     lengths_m = 0.5 * (ego.length_m + paths.vehicle_length_m)
     for _ in range(steps):
-        come_and_go(paths, lanes, sharing, settings, episodes, vehicles)
+        come_and_go(ego, paths, lanes, sharing, corners, settings, episodes, vehicles)
         find_leaders(sharing, episodes, vehicles)
         count_decisions(episodes, counts, actions)
         follow_leaders(paths.vehicle_length_m, idm, episodes, vehicles)

@@ -70,15 +70,16 @@ def yields_now(
 
 @kernel
 def find_leaders(sharing: Sharing, episodes: Episodes, vehicles: Vehicles) -> None:
-    """Find, where a decision is due, each vehicle's nearest one ahead on its path."""
-    running, phase = episodes.running, episodes.phase
+    """Find each vehicle's nearest one ahead on its path, where `leaders_due` asks for it."""
+    running, leaders_due = episodes.running, episodes.leaders_due
     driving, path, s_m = vehicles.driving, vehicles.path, vehicles.s_m
     leaders, leader_offset_m = vehicles.leader, vehicles.leader_offset_m
     low_m, high_m, offset_m = sharing.low_m, sharing.high_m, sharing.offset_m
     batch, count = driving.shape
     for b in range(batch):
-        if not running[b] or phase[b] != 0:
+        if not (running[b] and leaders_due[b]):
             continue
+        leaders_due[b] = False
         for i in range(count):
             p, own = path[b, i], s_m[b, i]
             nearest, leader = math.inf, NOBODY

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from risk_dqn_planner.compiled import kernel
 
 Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
 
 HALF_PLANES = 4
 
@@ -65,6 +66,28 @@ def cast_shadow(
     _half_plane(shadows, b, o, 2, ax, ay, x, y)
     ax, ay = catalogue[side, k, end, 0], catalogue[side, k, end, 1]
     _half_plane(shadows, b, o, 3, x, y, ax, ay)
+
+
+@kernel
+def cast_shadows(
+    catalogue: Floats,
+    obstacle: Integers,
+    b: int,
+    x: float,
+    y: float,
+    shadows: Floats,
+    row: int,
+) -> int:
+    """Fill shadows (row, ...) with those of episode b's obstacles (B, O); return how many.
+
+    Even places of `obstacle` are of the catalogue's first side, odd ones of its second, -1 none.
+    """
+    count = 0
+    for o in range(obstacle.shape[1]):
+        if obstacle[b, o] >= 0:
+            cast_shadow(catalogue, o % 2, obstacle[b, o], x, y, shadows, row, count)
+            count += 1
+    return count
 
 
 @kernel

@@ -5,7 +5,6 @@ Built once for a model, a scenario and a world seed. Arc lengths on a path count
 vehicles enter, which is not where the model's path begins (`shift_m`).
 """
 
-import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -14,6 +13,7 @@ import numpy as np
 from risk_dqn_planner.errors import NoConflictError, ScenarioError
 from risk_dqn_planner.intersection.model import ConflictKind, IntersectionModel
 from risk_dqn_planner.situation.situations import Booleans, Floats, Integers
+from sim_bridge.contact import contact_intervals
 from sim_bridge.matches import Matches, match_table
 from sim_bridge.obstacles import Catalogue, obstacle_catalogue
 from sim_bridge.path_geometry import SPACING_M, sampled
@@ -57,7 +57,8 @@ class Paths(NamedTuple):
 
     All others (P,). length_m: of the path; lane: index into M lanes; limit_mps; zone_m, exit_m:
     the conflict zone's centre and end; shift_m: from arc length on the model's path to that
-    used here. contact_low_m, contact_high_m: outside of these a vehicle cannot touch the ego.
+    used here; entry_is_far: vehicles enter beyond the sensor's range; contact_low_m,
+    contact_high_m: outside of these a vehicle cannot touch the ego.
     """
 
     table: Floats
@@ -67,6 +68,7 @@ class Paths(NamedTuple):
     zone_m: Floats
     exit_m: Floats
     shift_m: Floats
+    entry_is_far: Booleans
     contact_low_m: Floats
     contact_high_m: Floats
     vehicle_length_m: float
@@ -127,7 +129,7 @@ def build_world(
     reach = max(scenario.sensor.range_m, scenario.traffic.start_distance_m.high)
     traffic = traffic_lines(model, reach + _OUT_OF_REACH_M, _BEYOND_ZONE_M)
     entries = np.flatnonzero(traffic.enters)
-    ego, paths = _tables(model, lanes, traffic)
+    ego, paths = _tables(model, lanes, traffic, scenario.sensor.range_m)
     return World(
         ego=ego,
         paths=paths,
@@ -151,7 +153,7 @@ def build_world(
 
 
 def _tables(
-    model: IntersectionModel, lanes: list[int], traffic: TrafficLines
+    model: IntersectionModel, lanes: list[int], traffic: TrafficLines, sensor_range_m: float
 ) -> tuple[EgoLane, Paths]:
     """Sample the ego's path and the lines of all others, whose lanes (P,) are given."""
     conflicts = [path for lane in model.lanes for path in lane.paths]
@@ -164,9 +166,7 @@ def _tables(
     lane_zone = np.array([model.lanes[k].zone_length_m for k in lanes])
     starts = [lane.ego_zone_center_m - 0.5 * lane.ego_zone_length_m for lane in model.lanes]
     own, other = model.ego_dimensions, model.traffic_dimensions
-    reach = 0.5 * math.hypot(own.length_m, own.width_m)
-    reach += 0.5 * math.hypot(other.length_m, other.width_m)
-    ego_contact, contact = _contact(ego_table, table, reach)
+    ego_contact, contact = contact_intervals(ego_table, table, own, other)
     ego = EgoLane(
         table=ego_table[None],
         stop_line_m=model.stop_line.position_m,
@@ -185,31 +185,10 @@ def _tables(
         zone_m=zone,
         exit_m=zone + 0.5 * lane_zone,
         shift_m=np.array(traffic.shift_m),
+        entry_is_far=zone > sensor_range_m,
         contact_low_m=np.ascontiguousarray(contact[:, 0]),
         contact_high_m=np.ascontiguousarray(contact[:, 1]),
         vehicle_length_m=other.length_m,
         vehicle_width_m=other.width_m,
     )
     return ego, paths
-
-
-def _contact(ego: Floats, tables: Floats, reach_m: float) -> tuple[tuple[float, float], Floats]:
-    """Return where the ego's centre (low, high) and those on the paths (P, 2) come within reach.
-
-    Widened by the samples' spacing, so that outside of it no test for contact is needed.
-    """
-    result = np.tile((math.inf, -math.inf), (len(tables), 1))
-    ego_low, ego_high = math.inf, -math.inf
-    for p, table in enumerate(tables):
-        dx, dy = (table[:, None, k] - ego[None, :, k] for k in (0, 1))
-        near = np.hypot(dx, dy) < reach_m + SPACING_M
-        if near.any():
-            at, ego_at = (np.flatnonzero(near.any(axis=axis)) * SPACING_M for axis in (1, 0))
-            result[p] = at[0] - SPACING_M, at[-1] + SPACING_M
-            ego_low, ego_high = min(ego_low, ego_at[0]), max(ego_high, ego_at[-1])
-    # What lies beyond the last sample was not looked at.
-    at_end = result[:, 1] >= (tables.shape[1] - 1) * SPACING_M
-    result[at_end, 1] = math.inf
-    if ego_high >= (len(ego) - 1) * SPACING_M:
-        ego_high = math.inf
-    return (ego_low - SPACING_M, ego_high + SPACING_M), result

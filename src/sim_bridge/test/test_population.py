@@ -1,4 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
+import copy
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import combinations
@@ -7,12 +8,17 @@ import numpy as np
 import pytest
 
 from risk_dqn_planner.geometry.footprint import footprints_overlap
+from risk_dqn_planner.intersection.builder import build_intersection
 from risk_dqn_planner.intersection.model import IntersectionModel
+from risk_dqn_planner.map.loader import load_map
 from risk_dqn_planner.situation.situations import Floats
-from sim_bridge.population import has_room
+from sim_bridge.maps import shipped_map
+from sim_bridge.path_geometry import cut
+from sim_bridge.population import come_and_go, has_room
 from sim_bridge.scenario import Scenario
-from sim_bridge.scenario_fields import EgoStart, Interval, Obstacles
+from sim_bridge.scenario_fields import EgoStart, Interval, Obstacles, Sensor
 from sim_bridge.simulation import Simulation
+from sim_bridge.traffic import find_leaders
 
 WithVehicles = Callable[..., Scenario]
 STOP, FAST = 0, 2
@@ -227,3 +233,68 @@ def test_vehicles_of_one_lane_never_touch_while_they_follow_each_other(
                 there = vehicles.driving[episode] & (vehicles.path[episode] == path)
                 gaps = np.diff(np.sort(vehicles.s_m[episode, there])) - 4.0
                 assert (gaps > 0.5).all()
+
+
+def test_nobody_appears_on_a_short_path_while_the_ego_sees_its_beginning(
+    crossing_model: IntersectionModel, with_vehicles: WithVehicles, empty_road: Scenario
+):
+    # Both lanes begin only 40 m before their zones, which an ego near the line sees well.
+    lanes = tuple(
+        replace(
+            lane,
+            paths=tuple(
+                replace(
+                    path,
+                    path=replace(path.path, centerline=cut(path.path.centerline, 60.0, 160.0)),
+                    zone_center_m=40.0,
+                )
+                for path in lane.paths
+            ),
+        )
+        for lane in crossing_model.lanes
+    )
+    short = replace(crossing_model, lanes=lanes)
+    at_line = EgoStart(Interval(0.0, 0.0), Interval(0.0, 0.0))
+    for range_m, appears in [(70.0, False), (30.0, True)]:
+        scenario = replace(with_vehicles(empty_road, 4), sensor=Sensor(range_m=range_m))
+        simulation = started(short, replace(scenario, ego=at_line), batch=10)
+        drive_on(simulation, 80)
+        assert simulation.state.vehicles.driving.any() == appears
+        assert (simulation.state.vehicles.waiting | simulation.state.vehicles.driving).all()
+
+
+@pytest.mark.parametrize("name", ["t_junction", "multi_lane"])
+def test_leaders_found_only_when_due_are_those_found_every_time(
+    name: str, with_vehicles: WithVehicles, base: Scenario
+):
+    place = shipped_map(name)
+    model = build_intersection(load_map(place.path, place.origin), place.route)
+    simulation = started(model, with_vehicles(base, 8, headway_s=0.5), batch=20)
+    world, (episodes, vehicles, _) = simulation.world, simulation.state
+    followers = spared = 0
+    for _ in range(100):
+        come_and_go(
+            world.ego,
+            world.paths,
+            world.lanes,
+            world.sharing,
+            world.obstacles.corners,
+            simulation.settings,
+            episodes,
+            vehicles,
+        )
+        spared += int((~episodes.leaders_due).sum())
+        every_time = copy.deepcopy(vehicles)
+        find_leaders(
+            world.sharing, episodes._replace(leaders_due=np.ones(20, dtype=np.bool_)), every_time
+        )
+        find_leaders(world.sharing, episodes, vehicles)
+        driving = vehicles.driving
+        assert np.array_equal(vehicles.leader[driving], every_time.leader[driving])
+        followed = (vehicles.leader >= 0) & driving
+        offsets = (vehicles.leader_offset_m, every_time.leader_offset_m)
+        assert np.array_equal(*(offset[followed] for offset in offsets))
+        followers += int(followed.sum())
+        simulation.step(np.full(20, STOP))
+    assert followers > 1000
+    assert spared > 200

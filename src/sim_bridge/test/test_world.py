@@ -85,14 +85,26 @@ def test_distances_to_the_zone_count_down_along_the_path(crossing_world: World):
     assert matches.share == pytest.approx([1.0, 1.0])
 
 
-def test_contact_is_possible_only_within_the_reach_of_both_footprints(crossing_world: World):
-    # Two half diagonals of 4 m by 2 m: 4.472 m, plus at most two samples of half a metre.
-    reach = math.hypot(4.0, 2.0)
-    low, high = crossing_world.paths.contact_low_m[0], crossing_world.paths.contact_high_m[0]
-    assert 85.0 - reach - 1.0 <= low <= 85.0 - reach
-    assert 85.0 + reach <= high <= 85.0 + reach + 1.0
-    assert crossing_world.ego.contact_low_m <= 100.0 - reach
-    assert crossing_world.ego.contact_high_m >= 103.5 + reach
+def test_contact_is_possible_only_where_footprints_overlap(crossing_world: World):
+    # A crossing at a right angle: half a length and half a width, 3 m, plus the margins of
+    # 0.5 m and 0.25 m and at most two samples of half a metre.
+    paths, ego = crossing_world.paths, crossing_world.ego
+    for low, high in zip(paths.contact_low_m, paths.contact_high_m, strict=True):
+        assert 85.0 - 4.75 <= low <= 85.0 - 3.0
+        assert 85.0 + 3.0 <= high <= 85.0 + 4.75
+    assert 100.0 - 4.75 <= ego.contact_low_m <= 100.0 - 3.0
+    assert 103.5 + 3.0 <= ego.contact_high_m <= 103.5 + 4.75
+
+
+def test_vehicles_beside_the_ego_on_their_own_lane_cannot_touch_it(
+    crossing_model: IntersectionModel, empty_road: Scenario
+):
+    beside = Polyline.from_points([(-3.5, 60.0), (-3.5, -100.0)])
+    lane = crossing_model.lanes[0]
+    path = replace(lane.paths[0], path=replace(lane.paths[0].path, centerline=beside))
+    model = replace(crossing_model, lanes=(replace(lane, paths=(path,)),))
+    world = build_world(model, empty_road)
+    assert world.paths.contact_low_m[0] == math.inf
 
 
 def test_a_merging_vehicle_may_touch_the_ego_up_to_its_path_end(merging_world: World):
@@ -143,6 +155,16 @@ def test_vehicles_near_and_behind_a_join_are_on_both_roads():
     # The joined part begins 50 - 1.73 m along the straight road.
     assert table.low_m[1, 0] == pytest.approx(50.0 - 1.73 - JOIN_VIEW_M, abs=0.3)
     assert table.high_m[1, 0] == math.inf
+
+
+def test_who_follows_whom_changes_only_near_forks_and_joins():
+    straight, left = fork()
+    table = sharing([straight, left], near_m=2.0)
+    # On the left road from the fork at 41.73 m to 46.4 m, and 10 m more either way.
+    assert table.change_low_m[1] == pytest.approx(31.73, abs=0.3)
+    assert table.change_high_m[1] == pytest.approx(56.4, abs=0.3)
+    alone = sharing([straight], near_m=2.0)
+    assert alone.change_low_m[0] == math.inf
 
 
 def test_opposite_lanes_and_crossings_share_nothing():

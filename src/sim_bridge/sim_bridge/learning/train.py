@@ -96,7 +96,7 @@ class _Logs:
 
 def _line(score: Score) -> str:
     return (
-        f"success {score.success:.1%} collision {score.collision:.1%} timeout {score.timeout:.1%}"
+        f"success {score.success:.0%} collision {score.collision:.1%} timeout {score.timeout:.0%}"
     )
 
 
@@ -104,8 +104,8 @@ def _train(session: Session, folder: RunFolder, console: Console) -> None:
     """Train to the end, showing and saving how it goes."""
     steps = session.run_description.config.steps
     columns = (
-        TextColumn("{task.completed:>7,} of {task.total:,} steps"),
-        BarColumn(bar_width=24),
+        TextColumn("{task.percentage:>3.0f}%"),
+        BarColumn(bar_width=16),
         TextColumn("{task.description}"),
         TimeElapsedColumn(),
         TimeRemainingColumn(),

@@ -1,0 +1,115 @@
+# SPDX-License-Identifier: Apache-2.0
+"""All contestants in all cells on the same episodes, one result each."""
+
+import hashlib
+import platform
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+
+from risk_dqn_planner.errors import ScenarioError
+from sim_bridge.environment.place import Place
+from sim_bridge.environment.seeds import TEST_SEEDS, fixed_seeds
+from sim_bridge.evaluation.cells import Cell, what_is_drawn
+from sim_bridge.evaluation.rollout import Clairvoyant, Contestant, joined, roll_out
+from sim_bridge.evaluation.store import Store, sources_fingerprint
+from sim_bridge.evaluation.summary import summarise
+from sim_bridge.learning.checkpoint import git_revision
+
+# Batches are no larger than memory and the wish to interrupt allow; results do not depend on it.
+BATCH = 500
+
+Advance = Callable[[int], None]
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """Where, on how many episodes of the test range, and where finished cells are kept."""
+
+    place: Place
+    episodes: int
+    store: Store
+
+    def result(self, driver: Contestant, cell: Cell, advance: Advance) -> dict[str, Any]:
+        """Return one line of results.json, driving the episodes unless they were driven before.
+
+        advance: told the number of episodes after each batch.
+
+        Raises:
+            ScenarioError: the cell cannot be laid out here, or has no optimum.
+        """
+        scenario = cell.load()
+        work = {
+            "policy": [driver.name, driver.hash],
+            "scenario": what_is_drawn(scenario),
+            "place": place_fingerprint(self.place),
+            "episodes": self.episodes,
+            "sources": sources_fingerprint(),
+        }
+        figures = self.store.get(work)
+        if figures is None:
+            figures = self._drive(driver, cell, advance)
+            self.store.put(work, figures)
+        else:
+            advance(self.episodes)
+        return {
+            "policy": driver.name,
+            "policy_hash": driver.hash,
+            "training_seed": driver.training_seed,
+            "map": self.place.map_name,
+            "scenario": scenario.name,
+            "traffic": cell.traffic,
+            "sensor_range_m": scenario.sensor.range_m,
+            **figures,
+        }
+
+    def _drive(self, driver: Contestant, cell: Cell, advance: Advance) -> dict[str, Any]:
+        seeds = fixed_seeds(TEST_SEEDS, self.episodes)
+        simulation = self.place.simulation(cell.load(), min(BATCH, self.episodes))
+        parts = []
+        for part in roll_out(simulation, driver, seeds):
+            parts.append(part)
+            advance(len(part.optimal))
+        driven = joined(parts)
+        figures = summarise(driven)
+        if isinstance(driver, Clairvoyant):
+            figures["proven_share"] = round(float(np.mean(driven.optimal)), 6)
+        return figures
+
+
+def place_fingerprint(place: Place) -> str:
+    """Return a SHA-256 of an intersection with all that is built on it."""
+    digest = hashlib.sha256(repr(place.model).encode())
+    paths = [path.path for lane in place.model.lanes for path in lane.paths]
+    lines = [path.centerline.xy for path in (place.model.ego_path, *paths)]
+    for points in (*lines, *place.outlines):
+        digest.update(np.ascontiguousarray(points).tobytes())
+    return digest.hexdigest()
+
+
+def has_optimum(driver: Contestant, place: Place, cell: Cell) -> str:
+    """Return why a contestant cannot take part in a cell; empty if it can."""
+    if not isinstance(driver, Clairvoyant):
+        return ""
+    try:
+        driver.drive(place.simulation(cell.load(), 1), fixed_seeds(TEST_SEEDS, 1))
+    except ScenarioError as error:
+        return str(error)
+    return ""
+
+
+def versions(place: Place, policies: Sequence[str]) -> dict[str, Any]:
+    """Return what the results depend on; nothing in it changes from one run to the next."""
+    return {
+        "git_revision": git_revision(),
+        "sources": sources_fingerprint(),
+        "python": platform.python_version(),
+        "numpy": version("numpy"),
+        "numba": version("numba"),
+        "map": place.map_name,
+        "policies": list(policies),
+        "first_seed": TEST_SEEDS.start,
+    }

@@ -1,0 +1,186 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Evaluates policies in every situation of the paper's figures, on the same episodes each.
+
+Writes results.json and the paper's four figures into the output folder. Interrupted, the same
+command goes on where it was. Exit code: 0 done, 2 an option is no good, 130 interrupted.
+"""
+
+import argparse
+import glob
+import json
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
+from rich.table import Table
+
+from risk_dqn_planner.errors import ConfigurationError, PlannerError
+from risk_dqn_planner.map.loader import MapOrigin
+from sim_bridge.environment.place import Place, load_place
+from sim_bridge.evaluation.campaign import Campaign, has_optimum, versions
+from sim_bridge.evaluation.cells import Cell, cells_of, paper_cells
+from sim_bridge.evaluation.rollout import Contestant, contestant
+from sim_bridge.evaluation.store import Store, write_whole
+from sim_bridge.maps import map_names
+
+DEFAULT_POLICIES = ("rule_based", "always_fast", "always_slow", "clairvoyant")
+RESULTS = "results.json"
+INTERRUPTED = 130
+
+
+def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog="evaluate", description=__doc__)
+    add = parser.add_argument
+    add("--episodes", type=int, default=2000, help="in each cell [%(default)s]")
+    add(
+        "--policies",
+        default=",".join(DEFAULT_POLICIES),
+        help="names, policy files (* allowed) or module:factory, by commas [%(default)s]",
+    )
+    add("--scenarios", help="names or .yaml files instead of the paper's cells, by commas")
+    maps = ", ".join(map_names())
+    add("--map", default="four_way", help=f"own map ({maps}) or an .osm file [%(default)s]")
+    add("--route", help="lanelet ids, separated by commas; own maps have one")
+    add("--origin", help="latitude,longitude of the map's projection [deg]")
+    add("--training", type=Path, default=Path("out/training"), help="training runs [%(default)s]")
+    add("--output", type=Path, default=Path("out/evaluation"), help="folder [%(default)s]")
+    add("--report", type=Path, help="also write the tables as this Markdown file")
+    return parser.parse_args(argv)
+
+
+def _policies(text: str) -> list[str]:
+    """Return the names; a pattern stands for the files that match it.
+
+    Raises:
+        ConfigurationError: no file matches.
+    """
+    names: list[str] = []
+    for name in (part.strip() for part in text.split(",")):
+        found = sorted(glob.glob(name)) if "*" in name else [name]  # noqa: PTH207 (any folder)
+        if not found or not name:
+            raise ConfigurationError(f"no policy file matches '{name}'")
+        names += found
+    return names
+
+
+def _place(arguments: argparse.Namespace) -> Place:
+    route = None
+    if arguments.route is not None:
+        try:
+            route = tuple(int(part) for part in arguments.route.split(","))
+        except ValueError as error:
+            raise ConfigurationError(
+                f"route is {arguments.route!r}, expected lanelet ids separated by commas"
+            ) from error
+    origin = MapOrigin.from_text(arguments.origin) if arguments.origin else None
+    return load_place(arguments.map, route, origin)
+
+
+def _run(
+    campaign: Campaign,
+    drivers: list[Contestant],
+    cells: list[Cell],
+    console: Console,
+    results: list[dict[str, Any]],
+) -> None:
+    """Append the results of all drivers in all cells, showing how far it is."""
+    columns = (
+        TextColumn("{task.description:<44}"),
+        BarColumn(bar_width=24),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TimeRemainingColumn(),
+    )
+    with Progress(*columns, console=console) as progress:
+        task = progress.add_task("", total=len(drivers) * len(cells) * campaign.episodes)
+        for driver in drivers:
+            reason = has_optimum(driver, campaign.place, cells[0])
+            if reason:
+                console.print(f"{driver.name} is left out: {reason}")
+                progress.advance(task, len(cells) * campaign.episodes)
+                continue
+            for cell in cells:
+                label = f"{driver.name} {cell.scenario} {cell.traffic}"
+                progress.update(task, description=label)
+                results.append(
+                    campaign.result(driver, cell, lambda count: progress.advance(task, count))
+                )
+
+
+def _write(folder: Path, head: dict[str, Any], results: list[dict[str, Any]]) -> None:
+    folder.mkdir(parents=True, exist_ok=True)
+    write_whole(folder / RESULTS, json.dumps({"versions": head, "cells": results}, indent=1) + "\n")
+
+
+def _overview(results: list[dict[str, Any]]) -> Table:
+    table = Table(title="success / collision / timeout in %, mean speed in m/s")
+    for name in ("policy", "scenario", "traffic", "range", "S / C / T", "speed"):
+        table.add_column(name, no_wrap=name in ("range", "S / C / T", "speed"), overflow="fold")
+    for result in results:
+        rates = (100.0 * result[key]["rate"] for key in ("success", "collision", "timeout"))
+        table.add_row(
+            result["policy"],
+            result["scenario"],
+            result["traffic"],
+            f"{result['sensor_range_m']:g} m",
+            " / ".join(f"{rate:.1f}" for rate in rates),
+            f"{result['mean_speed_mps']['mean']:.2f}",
+        )
+    return table
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Evaluate as the command line says."""
+    arguments = _arguments(argv)
+    console = Console()
+    results: list[dict[str, Any]] = []
+    try:
+        if arguments.episodes < 1:
+            raise ConfigurationError(f"episodes is {arguments.episodes}, expected 1 or more")
+        names = _policies(arguments.policies)
+        drivers = [contestant(name) for name in names]
+        place = _place(arguments)
+        cells = cells_of(arguments.scenarios.split(",")) if arguments.scenarios else paper_cells()
+        for cell in cells:
+            cell.load()  # a wrong name is told before hours of work
+        campaign = Campaign(place, arguments.episodes, Store(arguments.output / "cells"))
+        _run(campaign, drivers, cells, console, results)
+        _write(arguments.output, versions(place, names), results)
+        _draw(arguments, console)
+    except PlannerError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        console.print("interrupted; the same command goes on with the cell it was in")
+        return INTERRUPTED
+    console.print(_overview(results))
+    console.print(f"{arguments.output / RESULTS}")
+    return 0
+
+
+def _draw(arguments: argparse.Namespace, console: Console) -> None:
+    """Draw the figures and write the report from results.json."""
+    # Matplotlib takes a second to load, too long for --help.
+    from sim_bridge.evaluation.figures import draw_figures  # noqa: PLC0415
+    from sim_bridge.evaluation.report import write_report  # noqa: PLC0415
+
+    content = json.loads((arguments.output / RESULTS).read_text(encoding="utf-8"))
+    for path in draw_figures(content["cells"], arguments.training, arguments.output):
+        console.print(f"{path}")
+    if arguments.report:
+        write_report(content, arguments.output, arguments.report)
+        console.print(f"{arguments.report}")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -48,7 +48,8 @@ def save_episode_picture(
         _draw_moment(axes, model, frames, frame)
     _draw_course(figure.add_subplot(grid[1, :]), frames)
     if title:
-        figure.suptitle(title, fontsize=11)
+        figure.suptitle(title, fontsize=11, y=0.995)
+        figure.set_layout_engine("constrained", rect=(0.0, 0.0, 1.0, 0.96))
     figure.legend(
         handles=_legend(), loc="outside lower center", ncols=12, fontsize=7, frameon=False
     )

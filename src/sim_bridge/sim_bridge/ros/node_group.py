@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Node processes that start and end together."""
 
-from collections.abc import Sequence
+import signal
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
 
@@ -18,9 +20,10 @@ class NodeGroup:
 
     def __enter__(self) -> "NodeGroup":
         try:
-            for command in self._commands:
-                log = self._log_folder / f"{command.executable}.log"
-                self._processes.append(NodeProcess(command, log))
+            with uninterrupted():
+                for command in self._commands:
+                    log = self._log_folder / f"{command.executable}.log"
+                    self._processes.append(NodeProcess(command, log))
         except BaseException:
             self.stop()
             raise
@@ -41,7 +44,25 @@ class NodeGroup:
 
     def stop(self) -> None:
         """End all nodes: ask everyone first, then wait."""
-        for process in self._processes:
-            process.interrupt()
-        for process in self._processes:
-            process.stop()
+        with uninterrupted():
+            for process in self._processes:
+                process.interrupt()
+            for process in self._processes:
+                process.stop()
+
+
+@contextmanager
+def uninterrupted() -> Iterator[None]:
+    """Hold requests to end back, or a process just started or not yet ended would be forgotten."""
+    held: list[int] = []
+    before = {
+        request: signal.signal(request, lambda number, _: held.append(number))
+        for request in (signal.SIGINT, signal.SIGTERM)
+    }
+    try:
+        yield
+    finally:
+        for request, handler in before.items():
+            signal.signal(request, handler)
+    if held:
+        raise KeyboardInterrupt

@@ -38,6 +38,16 @@ def contact_intervals(
     return _interval(ego_touched), np.array([_interval(row) for row in touched])
 
 
+def touching_paths(tables: Floats, vehicle: VehicleDimensions) -> Booleans:
+    """Tell which pairs (P, P) of paths have footprints that touch somewhere; tables (P, K, 3)."""
+    count = len(tables)
+    result = np.zeros((count, count), dtype=np.bool_)
+    for p in range(count):
+        _, intervals = contact_intervals(tables[p], tables, vehicle, vehicle)
+        result[p] = intervals[:, 0] < np.inf
+    return result
+
+
 def _interval(touched: Booleans) -> tuple[float, float]:
     where = np.flatnonzero(touched)
     if len(where) == 0:

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from risk_dqn_planner.compiled import kernel
+from risk_dqn_planner.geometry.footprint import footprints_overlap
 from risk_dqn_planner.situation.situations import Booleans, Floats, Integers
 from sim_bridge.path_geometry import table_pose
 from sim_bridge.randomness import (
@@ -33,95 +34,78 @@ from sim_bridge.visibility import HALF_PLANES, cast_shadows, point_hidden
 from sim_bridge.world import EgoLane, Lanes, Paths
 
 # How often a place is drawn for a vehicle before it is left to come in from upstream.
-_ATTEMPTS = 30
+_ATTEMPTS = 12
 _DRAWS_PER_VEHICLE = 4
-# Beyond the footprints' reach, on whatever lane.
+# Between footprints, on whatever lanes.
 _CLEARANCE_M = 0.5
 
 
 @kernel
 def has_room(
-    paths: Paths,
-    sharing: Sharing,
-    vehicles: Vehicles,
     b: int,
     i: int,
+    p: int,
     s: float,
-    standstill_gap_m: float,
+    desired_mps: float,
+    gap_m: float,
     headway_s: float,
+    driving: Booleans,
+    path: Integers,
+    s_m: Floats,
+    speed_mps: Floats,
+    table: Floats,
+    length_m: float,
+    width_m: float,
+    low_m: Floats,
+    high_m: Floats,
+    offset_m: Floats,
+    touches: Booleans,
 ) -> bool:
-    """Tell whether vehicle i may be placed at s on its path, moving at its desired speed.
+    """Tell whether a vehicle may be put into place i of episode b, at s on path p.
 
     Behind the next one and ahead of the one behind there must be the standstill gap and the
-    headway; nobody's footprint may come near, whatever lane it is on.
+    headway; nobody's footprint may come near, whatever lane it is on. Arrays as in Vehicles,
+    Paths and Sharing.
     """
-    p = vehicles.path[b, i]
-    x, y, _ = table_pose(paths.table, p, s)
-    clearance = math.hypot(paths.vehicle_length_m, paths.vehicle_width_m) + _CLEARANCE_M
-    least = paths.vehicle_length_m + standstill_gap_m
-    for j in range(vehicles.driving.shape[1]):
-        if j == i or not vehicles.driving[b, j]:
+    least_m = length_m + gap_m
+    for j in range(driving.shape[1]):
+        if j == i or not driving[b, j]:
             continue
-        q, other = vehicles.path[b, j], vehicles.s_m[b, j]
-        other_x, other_y, _ = table_pose(paths.table, q, other)
-        if math.hypot(other_x - x, other_y - y) < clearance:
-            return False
-        if sharing.low_m[p, q] <= other <= sharing.high_m[p, q]:
-            ahead = other + sharing.offset_m[p, q] - s
-            if 0.0 <= ahead < least + headway_s * vehicles.desired_speed_mps[b, i]:
+        q, other = path[b, j], s_m[b, j]
+        if low_m[p, q] <= other <= high_m[p, q]:
+            ahead = other + offset_m[p, q] - s
+            if 0.0 <= ahead < least_m + headway_s * desired_mps:
                 return False
-        if sharing.low_m[q, p] <= s <= sharing.high_m[q, p]:
-            behind = s + sharing.offset_m[q, p] - other
-            if 0.0 <= behind < least + headway_s * vehicles.speed_mps[b, j]:
+        if low_m[q, p] <= s <= high_m[q, p]:
+            behind = s + offset_m[q, p] - other
+            if 0.0 <= behind < least_m + headway_s * speed_mps[b, j]:
+                return False
+        if p != q and touches[p, q]:
+            x1, y1, heading1 = table_pose(table, p, s)
+            x2, y2, heading2 = table_pose(table, q, other)
+            length, width = length_m + _CLEARANCE_M, width_m + _CLEARANCE_M
+            if footprints_overlap(x1, y1, heading1, length, width, x2, y2, heading2, length, width):
                 return False
     return True
 
 
 @kernel
-def choose_vehicle(
-    paths: Paths, lanes: Lanes, draws: Draws, episodes: Episodes, vehicles: Vehicles, b: int, i: int
-) -> None:
-    """Let a new vehicle, with a new id, wait in place i; all it is depends on its id alone."""
-    seed = episodes.seed[b]
-    number = episodes.next_id[b]
-    episodes.next_id[b] += 1
+def draw_vehicle(
+    seed: np.uint64, number: int, draws: Draws, first_entry: Integers, entry_path: Integers
+) -> tuple[int, float, bool]:
+    """Return path, desired speed and whether it yields, of the vehicle with an id.
+
+    All depends on seed and id alone. first_entry and entry_path as in Lanes.
+    """
     draw = number * _DRAWS_PER_VEHICLE
     # A lane first, so that lanes with many ways in do not have more traffic than others.
-    lane = random_index(seed, VEHICLE_STREAM, draw, len(lanes.id))
-    first, behind = lanes.first_entry[lane], lanes.first_entry[lane + 1]
-    path = lanes.entry_path[first + random_index(seed, VEHICLE_STREAM, draw + 1, behind - first)]
+    lane = random_index(seed, VEHICLE_STREAM, draw, len(first_entry) - 1)
+    first, behind = first_entry[lane], first_entry[lane + 1]
+    way = random_index(seed, VEHICLE_STREAM, draw + 1, behind - first)
     low, high = draws.desired_speed_mps
     desired = random_between(seed, VEHICLE_STREAM, draw + 2, low, high)
     share = random_share(seed, VEHICLE_STREAM, draw + 3)
-    vehicles.id[b, i] = number
-    vehicles.driving[b, i] = False
-    vehicles.waiting[b, i] = True
-    vehicles.path[b, i] = path
-    vehicles.desired_speed_mps[b, i] = min(desired, paths.limit_mps[path])
-    vehicles.yields[b, i] = share < draws.yielding_share
-    vehicles.follows_ego[b, i] = False
-    vehicles.leader[b, i] = NOBODY
-
-
-@kernel
-def place(
-    paths: Paths,
-    sharing: Sharing,
-    vehicles: Vehicles,
-    b: int,
-    i: int,
-    s: float,
-    gap_m: float,
-    headway_s: float,
-) -> bool:
-    """Let vehicle i drive from s on if there is room for it; tell whether it does."""
-    if not has_room(paths, sharing, vehicles, b, i, s, gap_m, headway_s):
-        return False
-    vehicles.driving[b, i] = True
-    vehicles.waiting[b, i] = False
-    vehicles.s_m[b, i] = s
-    vehicles.speed_mps[b, i] = vehicles.desired_speed_mps[b, i]
-    return True
+    return entry_path[first + way], desired, share < draws.yielding_share
 
 
 @kernel
@@ -165,9 +149,13 @@ def come_and_go(
     Notes whether leaders have to be found anew. corners (2, K, 4, 2): the obstacles' catalogue.
     """
     driving, waiting, path, s_m = vehicles.driving, vehicles.waiting, vehicles.path, vehicles.s_m
+    speed_mps, desired_mps = vehicles.speed_mps, vehicles.desired_speed_mps
+    ids, yields, follows_ego = vehicles.id, vehicles.yields, vehicles.follows_ego
     running, phase, leaders_due = episodes.running, episodes.phase, episodes.leaders_due
-    length_m, entry_is_far = paths.length_m, paths.entry_is_far
-    low_m, high_m = sharing.change_low_m, sharing.change_high_m
+    seed, next_id = episodes.seed, episodes.next_id
+    length_m, limit_mps, entry_is_far = paths.length_m, paths.limit_mps, paths.entry_is_far
+    first_entry, entry_path = lanes.first_entry, lanes.entry_path
+    change_low_m, change_high_m = sharing.change_low_m, sharing.change_high_m
     draws, gap_m = settings.draws, settings.idm.standstill_gap_m
     shadows = np.empty((1, episodes.obstacle.shape[1], HALF_PLANES, 3))
     batch, count = driving.shape
@@ -176,30 +164,70 @@ def come_and_go(
             continue
         for i in range(count):
             p, s = path[b, i], s_m[b, i]
-            leaders_due[b] |= (s >= low_m[p]) & (s <= high_m[p])
+            leaders_due[b] |= (s >= change_low_m[p]) & (s <= change_high_m[p])
             if driving[b, i] and s > length_m[p]:
                 driving[b, i] = False
+                waiting[b, i] = draws.respawn
                 leaders_due[b] = True
-                if draws.respawn:
-                    choose_vehicle(paths, lanes, draws, episodes, vehicles, b, i)
-            p = path[b, i]
-            if not waiting[b, i] or (
-                not entry_is_far[p]
-                and entry_in_sight(ego, paths, corners, settings, episodes, b, p, shadows)
+                p, desired, yields[b, i] = draw_vehicle(
+                    seed[b], next_id[b], draws, first_entry, entry_path
+                )
+                path[b, i], desired_mps[b, i] = p, min(desired, limit_mps[p])
+                ids[b, i], follows_ego[b, i] = next_id[b], False
+                next_id[b] += 1
+            if not waiting[b, i]:
+                continue
+            if not entry_is_far[p] and entry_in_sight(
+                ego, paths, corners, settings, episodes, b, p, shadows
             ):
                 continue
-            leaders_due[b] |= place(paths, sharing, vehicles, b, i, 0.0, gap_m, draws.headway_s)
+            if has_room(
+                b,
+                i,
+                p,
+                0.0,
+                desired_mps[b, i],
+                gap_m,
+                draws.headway_s,
+                driving,
+                path,
+                s_m,
+                speed_mps,
+                paths.table,
+                paths.vehicle_length_m,
+                paths.vehicle_width_m,
+                sharing.low_m,
+                sharing.high_m,
+                sharing.offset_m,
+                sharing.touches,
+            ):
+                driving[b, i], waiting[b, i] = True, False
+                s_m[b, i], speed_mps[b, i] = 0.0, desired_mps[b, i]
+                leaders_due[b] = True
 
 
 @kernel
-def start_ego(stop_line_m: float, draws: Draws, episodes: Episodes, b: int) -> None:
-    """Draw the ego's place and speed in episode b."""
-    seed = episodes.seed[b]
-    low, high = draws.ego_distance_m
-    before = random_between(seed, EGO_STREAM, 0, low, min(high, stop_line_m))
-    episodes.ego_s_m[b] = stop_line_m - before
-    low, high = draws.ego_speed_mps
-    episodes.ego_speed_mps[b] = random_between(seed, EGO_STREAM, 1, low, high)
+def start_egos(
+    stop_line_m: float, draws: Draws, episodes: Episodes, counts: Counts, mask: Booleans
+) -> None:
+    """Draw the places and speeds of the egos that a mask (B,) names, and count anew."""
+    for b in range(len(mask)):
+        if not mask[b]:
+            continue
+        seed = episodes.seed[b]
+        low, high = draws.ego_distance_m
+        before = random_between(seed, EGO_STREAM, 0, low, min(high, stop_line_m))
+        episodes.ego_s_m[b] = counts.start_s_m[b] = stop_line_m - before
+        low, high = draws.ego_speed_mps
+        episodes.ego_speed_mps[b] = random_between(seed, EGO_STREAM, 1, low, high)
+        counts.action_changes[b] = 0
+        counts.last_action[b] = NO_ACTION
+        counts.hard_brakes[b] = 0
+        counts.least_time_gap_s[b] = math.inf
+        for action in range(counts.action_counts.shape[1]):
+            counts.action_counts[b, action] = 0
+        for lane in range(counts.last_left_s.shape[1]):
+            counts.last_left_s[b, lane] = -math.inf
 
 
 @kernel
@@ -210,40 +238,64 @@ def start_traffic(
     settings: Settings,
     episodes: Episodes,
     vehicles: Vehicles,
-    b: int,
+    mask: Booleans,
 ) -> None:
-    """Draw the vehicles of episode b; who finds no place waits for one upstream."""
-    seed, draws, gap_m = episodes.seed[b], settings.draws, settings.idm.standstill_gap_m
-    low, high = draws.start_distance_m
+    """Draw the vehicles of episodes; who finds no place waits for one upstream."""
+    driving, waiting, path, s_m = vehicles.driving, vehicles.waiting, vehicles.path, vehicles.s_m
+    speed_mps, desired_mps = vehicles.speed_mps, vehicles.desired_speed_mps
+    low_m, high_m, offset_m, touches = (
+        sharing.low_m,
+        sharing.high_m,
+        sharing.offset_m,
+        sharing.touches,
+    )
+    seeds, next_id = episodes.seed, episodes.next_id
+    ids, yields, follows_ego = vehicles.id, vehicles.yields, vehicles.follows_ego
+    first_entry, entry_path = lanes.first_entry, lanes.entry_path
+    table, zone_m, limit_mps = paths.table, paths.zone_m, paths.limit_mps
+    length_m, width_m = paths.vehicle_length_m, paths.vehicle_width_m
+    draws, gap_m = settings.draws, settings.idm.standstill_gap_m
+    nearest_m, furthest_m = draws.start_distance_m
     fewest, most = draws.vehicles
-    count = fewest + random_index(seed, COUNT_STREAM, 0, most - fewest + 1)
-    episodes.next_id[b] = 1
-    for i in range(vehicles.driving.shape[1]):
-        vehicles.driving[b, i] = False
-        vehicles.waiting[b, i] = False
-    for i in range(count):
-        choose_vehicle(paths, lanes, draws, episodes, vehicles, b, i)
-        center = paths.zone_m[vehicles.path[b, i]]
-        for attempt in range(_ATTEMPTS):
-            draw = vehicles.id[b, i] * _ATTEMPTS + attempt
-            before = random_between(seed, PLACE_STREAM, draw, min(low, center), min(high, center))
-            s = center - before
-            if place(paths, sharing, vehicles, b, i, s, gap_m, draws.headway_s):
-                break
-
-
-@kernel
-def start_counts(counts: Counts, episodes: Episodes, b: int) -> None:
-    """Begin to count anew."""
-    counts.start_s_m[b] = episodes.ego_s_m[b]
-    counts.action_changes[b] = 0
-    counts.last_action[b] = NO_ACTION
-    counts.hard_brakes[b] = 0
-    counts.least_time_gap_s[b] = math.inf
-    for action in range(counts.action_counts.shape[1]):
-        counts.action_counts[b, action] = 0
-    for lane in range(counts.last_left_s.shape[1]):
-        counts.last_left_s[b, lane] = -math.inf
+    for b in range(len(mask)):
+        if not mask[b]:
+            continue
+        seed = seeds[b]
+        count = fewest + random_index(seed, COUNT_STREAM, 0, most - fewest + 1)
+        next_id[b] = count + 1
+        for i in range(driving.shape[1]):
+            driving[b, i] = False
+            waiting[b, i] = i < count
+        for i in range(count):
+            p, desired, yields[b, i] = draw_vehicle(seed, i + 1, draws, first_entry, entry_path)
+            ids[b, i], follows_ego[b, i], path[b, i] = i + 1, False, p
+            speed_mps[b, i] = desired_mps[b, i] = min(desired, limit_mps[p])
+            low, high = min(nearest_m, zone_m[p]), min(furthest_m, zone_m[p])
+            for attempt in range(_ATTEMPTS):
+                draw = (i + 1) * _ATTEMPTS + attempt
+                s = zone_m[p] - random_between(seed, PLACE_STREAM, draw, low, high)
+                if has_room(
+                    b,
+                    i,
+                    p,
+                    s,
+                    desired_mps[b, i],
+                    gap_m,
+                    draws.headway_s,
+                    driving,
+                    path,
+                    s_m,
+                    speed_mps,
+                    table,
+                    length_m,
+                    width_m,
+                    low_m,
+                    high_m,
+                    offset_m,
+                    touches,
+                ):
+                    driving[b, i], waiting[b, i], s_m[b, i] = True, False, s
+                    break
 
 
 @kernel
@@ -278,6 +330,5 @@ def start_episodes(
             count = obstacle_count[o % 2]
             chosen = random_index(seeds[b], OBSTACLE_STREAM, o, max(count, 1))
             episodes.obstacle[b, o] = chosen if count > 0 else NOBODY
-        start_ego(stop_line_m, settings.draws, episodes, b)
-        start_traffic(paths, lanes, sharing, settings, episodes, state.vehicles, b)
-        start_counts(state.counts, episodes, b)
+    start_egos(stop_line_m, settings.draws, episodes, state.counts, mask)
+    start_traffic(paths, lanes, sharing, settings, episodes, state.vehicles, mask)

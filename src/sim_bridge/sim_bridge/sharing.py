@@ -11,7 +11,9 @@ import numpy as np
 
 from risk_dqn_planner.geometry.polyline import MIN_POINT_SPACING_M, Polyline
 from risk_dqn_planner.intersection.model import ConflictKind, IntersectionModel
-from risk_dqn_planner.situation.situations import Floats
+from risk_dqn_planner.situation.situations import Booleans, Floats
+from risk_dqn_planner.vehicle import VehicleDimensions
+from sim_bridge.contact import touching_paths
 from sim_bridge.path_geometry import Shared, cut, shared_stretch
 
 # Vehicles on joining branches take each other for leaders from so far before the join.
@@ -25,6 +27,7 @@ class Sharing(NamedTuple):
     """Row p, column q, all (P, P): vehicle at s on path q is on or near path p.
 
     It is so for low_m <= s <= high_m (none: infinity and minus infinity), at s + offset_m on p.
+    touches (P, P): footprints on both paths may touch somewhere, be it at a crossing.
     change_low_m, change_high_m (P,): only where a vehicle is between them on its path can it
     change who follows whom, but by coming or leaving: at joins and forks.
     """
@@ -32,6 +35,7 @@ class Sharing(NamedTuple):
     low_m: Floats
     high_m: Floats
     offset_m: Floats
+    touches: Booleans
     change_low_m: Floats
     change_high_m: Floats
 
@@ -105,13 +109,17 @@ def _grown(line: Polyline, lines: list[Polyline]) -> tuple[Polyline, float]:
     return Polyline.from_points(np.concatenate((before, line.xy))), upstream
 
 
-def sharing(lines: list[Polyline], near_m: float) -> Sharing:
-    """Compare all pairs of lines; vehicles within `near_m` of a forking line count as on it."""
+def sharing(lines: list[Polyline], tables: Floats, vehicle: VehicleDimensions) -> Sharing:
+    """Compare all pairs of lines, given also as poses (P, K, 3).
+
+    Vehicles within their width of a forking line count as on it.
+    """
     count = len(lines)
     table = Sharing(
         low_m=np.full((count, count), np.inf),
         high_m=np.full((count, count), -np.inf),
         offset_m=np.zeros((count, count)),
+        touches=touching_paths(tables, vehicle),
         change_low_m=np.full(count, np.inf),
         change_high_m=np.full(count, -np.inf),
     )
@@ -120,7 +128,7 @@ def sharing(lines: list[Polyline], near_m: float) -> Sharing:
             if p == q:
                 table.low_m[p, q], table.high_m[p, q] = -np.inf, np.inf
                 continue
-            stretch = shared_stretch(line, other, near_m)
+            stretch = shared_stretch(line, other, vehicle.width_m)
             if stretch is not None:
                 low, high = _interval(stretch, line, other)
                 table.low_m[p, q], table.high_m[p, q] = low, high

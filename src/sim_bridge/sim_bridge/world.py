@@ -144,7 +144,7 @@ def build_world(
             ego_zone_m=np.array([lane.ego_zone_length_m for lane in model.lanes]),
             zone_m=np.array([lane.zone_length_m for lane in model.lanes]),
         ),
-        sharing=sharing(traffic.line, model.traffic_dimensions.width_m),
+        sharing=sharing(traffic.line, paths.table, model.traffic_dimensions),
         ego_sharing=sharing_with_ego(model, lanes, traffic),
         matches=match_table(model, paths.table, paths.length_m),
         sight=sight_lines(model, scenario.sensor.range_m),

@@ -18,7 +18,9 @@ from sim_bridge.population import come_and_go, has_room
 from sim_bridge.scenario import Scenario
 from sim_bridge.scenario_fields import EgoStart, Interval, Obstacles, Sensor
 from sim_bridge.simulation import Simulation
+from sim_bridge.state import Vehicles
 from sim_bridge.traffic import find_leaders
+from sim_bridge.world import World
 
 WithVehicles = Callable[..., Scenario]
 STOP, FAST = 0, 2
@@ -124,6 +126,31 @@ def test_obstacles_are_picked_for_each_side_on_its_own(
     assert len({tuple(row) for row in obstacle}) > 195
 
 
+def room(world: World, vehicles: Vehicles, path: int, s: float, headway_s: float) -> bool:
+    """Whether there is room for a second vehicle that wants to drive at 4 m/s."""
+    paths, sharing = world.paths, world.sharing
+    return has_room(
+        0,
+        1,
+        path,
+        s,
+        4.0,
+        2.0,
+        headway_s,
+        vehicles.driving,
+        vehicles.path,
+        vehicles.s_m,
+        vehicles.speed_mps,
+        paths.table,
+        paths.vehicle_length_m,
+        paths.vehicle_width_m,
+        sharing.low_m,
+        sharing.high_m,
+        sharing.offset_m,
+        sharing.touches,
+    )
+
+
 @pytest.mark.parametrize(
     ("s", "free"),
     [
@@ -148,8 +175,7 @@ def test_room_for_a_vehicle_is_the_standstill_gap_and_the_followers_headway(
     vehicles.driving[0] = [True, False]
     vehicles.path[0] = 0
     vehicles.s_m[0, 0], vehicles.speed_mps[0, 0] = 50.0, 6.0
-    vehicles.desired_speed_mps[0, 1] = 4.0
-    assert has_room(world.paths, world.sharing, vehicles, 0, 1, s, 2.0, 1.5) == free
+    assert room(world, vehicles, 0, s, headway_s=1.5) == free
 
 
 def test_there_is_no_room_where_another_lane_crosses_an_occupied_place(
@@ -160,13 +186,13 @@ def test_there_is_no_room_where_another_lane_crosses_an_occupied_place(
     world, vehicles = simulation.world, simulation.state.vehicles
     vehicles.driving[0] = [True] + [False] * 5
     # One on the lane from the east, right where the turning lane crosses it.
-    vehicles.path[0, :2] = 0, 1
+    vehicles.path[0, 0] = 0
     crossing = world.paths.table[1]
     s = 0.5 * int(np.abs(crossing[:, 1] - 3.5).argmin())
     vehicles.s_m[0, 0] = world.paths.zone_m[0] - crossing[int(2 * s), 0]
-    assert not has_room(world.paths, world.sharing, vehicles, 0, 1, s, 2.0, 0.0)
+    assert not room(world, vehicles, 1, s, headway_s=0.0)
     vehicles.s_m[0, 0] = 0.0
-    assert has_room(world.paths, world.sharing, vehicles, 0, 1, s, 2.0, 0.0)
+    assert room(world, vehicles, 1, s, headway_s=0.0)
 
 
 def drive_on(simulation: Simulation, steps: int) -> set[tuple[int, int]]:

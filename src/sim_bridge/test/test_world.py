@@ -8,10 +8,11 @@ import pytest
 from risk_dqn_planner.errors import NoConflictError, ScenarioError
 from risk_dqn_planner.geometry.polyline import Polyline
 from risk_dqn_planner.intersection.model import IntersectionModel
-from sim_bridge.path_geometry import cut, shared_stretch, simplified, table_pose
+from risk_dqn_planner.vehicle import VehicleDimensions
+from sim_bridge.path_geometry import cut, sampled, shared_stretch, simplified, table_pose
 from sim_bridge.scenario import Scenario
 from sim_bridge.scenario_fields import EgoStart, Interval, Sensor
-from sim_bridge.sharing import JOIN_VIEW_M, sharing
+from sim_bridge.sharing import JOIN_VIEW_M, Sharing, sharing
 from sim_bridge.world import World, build_world
 
 
@@ -33,6 +34,11 @@ def fork() -> list[Polyline]:
     ]
     straight = Polyline.from_points([(-50.0, 0.0), (50.0, 0.0)])
     return [straight, Polyline.from_points([(-40.0, 0.0), *arc, (10.0, 40.0)])]
+
+
+def sharing_of(*lines: Polyline) -> Sharing:
+    tables = np.array([sampled(line, 201) for line in lines])
+    return sharing(list(lines), tables, VehicleDimensions(4.0, 2.0))
 
 
 def test_vehicles_enter_beyond_the_start_distances_and_leave_40_m_behind_the_zone(
@@ -140,7 +146,7 @@ def test_two_lines_share_what_lies_before_their_fork():
 
 def test_vehicles_before_and_just_behind_a_fork_are_on_both_roads():
     straight, left = fork()
-    table = sharing([straight, left], near_m=2.0)
+    table = sharing_of(straight, left)
     assert table.low_m[0, 1] == -math.inf
     assert table.high_m[0, 1] == pytest.approx(46.4, abs=0.3)
     assert table.offset_m[0, 1] == pytest.approx(10.0)
@@ -151,7 +157,7 @@ def test_vehicles_before_and_just_behind_a_fork_are_on_both_roads():
 def test_vehicles_near_and_behind_a_join_are_on_both_roads():
     straight, left = fork()
     reverse = [Polyline.from_points(line.xy[::-1]) for line in (straight, left)]
-    table = sharing(reverse, near_m=2.0)
+    table = sharing_of(*reverse)
     # The joined part begins 50 - 1.73 m along the straight road.
     assert table.low_m[1, 0] == pytest.approx(50.0 - 1.73 - JOIN_VIEW_M, abs=0.3)
     assert table.high_m[1, 0] == math.inf
@@ -159,11 +165,11 @@ def test_vehicles_near_and_behind_a_join_are_on_both_roads():
 
 def test_who_follows_whom_changes_only_near_forks_and_joins():
     straight, left = fork()
-    table = sharing([straight, left], near_m=2.0)
+    table = sharing_of(straight, left)
     # On the left road from the fork at 41.73 m to 46.4 m, and 10 m more either way.
     assert table.change_low_m[1] == pytest.approx(31.73, abs=0.3)
     assert table.change_high_m[1] == pytest.approx(56.4, abs=0.3)
-    alone = sharing([straight], near_m=2.0)
+    alone = sharing_of(straight)
     assert alone.change_low_m[0] == math.inf
 
 
@@ -173,6 +179,9 @@ def test_opposite_lanes_and_crossings_share_nothing():
     north = Polyline.from_points([(0.0, -50.0), (0.0, 50.0)])
     assert shared_stretch(east, west, 2.0) is None
     assert shared_stretch(east, north, 2.0) is None
+    assert sharing_of(east, north).touches.all()
+    beside = Polyline.from_points([(50.0, 3.5), (-50.0, 3.5)])
+    assert sharing_of(east, beside).touches.tolist() == [[True, False], [False, True]]
 
 
 def test_a_cut_line_is_the_part_between_two_arc_lengths():

@@ -166,15 +166,20 @@ def lower_bounds(
     decisions = -(-latest // rules.decision_steps)
     least = np.full((decisions + 1, len(speeds.mps), cells), NEVER, dtype=np.int16)
     dead = np.zeros(cells, dtype=np.bool_)
+    goal_m, top_mps = rules.goal_m - start_m, speeds.mps.max()
     for d in range(decisions - 1, -1, -1):
         tick = d * rules.decision_steps
+        # Where the ego can be by then, and still be at the goal in time.
+        rest_m = top_mps * rules.step_s * (latest - tick)
+        begin = max(int((goal_m - rest_m) / CELL_M) - 1, 0)
+        end = min(int(top_mps * rules.step_s * tick / CELL_M) + 3, cells)
         for v in range(len(speeds.mps)):
             for action in range(_ACTIONS):
                 then = least[d + 1, speeds.after[v, action]]
                 way_m = speeds.way_m[v, action]
                 mark_collisions(way_m, blocked, first, tick, dead)
-                relax(way_m[-1], then, dead, least[d, v])
-                arrive(way_m, rules.goal_m - start_m, tick, latest, dead, least[d, v])
+                relax(way_m[-1], then, dead, begin, end, least[d, v])
+                arrive(way_m, goal_m, tick, latest, dead, end, least[d, v])
     return Bounds(least, start_m)
 
 
@@ -205,12 +210,20 @@ def mark_collisions(
 
 
 @kernel
-def relax(way_m: float, then: NDArray[np.int16], dead: Booleans, least: NDArray[np.int16]) -> None:
-    """Lower `least` (C,) to the bounds `then` (C,) of where a motion leads."""
+def relax(
+    way_m: float,
+    then: NDArray[np.int16],
+    dead: Booleans,
+    begin: int,
+    end: int,
+    least: NDArray[np.int16],
+) -> None:
+    """Lower `least` (C,) from begin to end to the bounds `then` (C,) of where a motion leads."""
     low, high = whole_cells(way_m)
-    for c in range(len(least) - high):
-        if not dead[c]:
-            least[c] = min(least[c], then[c + low], then[c + high])
+    for c in range(begin, min(end, len(least) - high)):
+        best = min(then[c + low], then[c + high])
+        # Written as a choice, not a branch, so that it runs in vector registers.
+        least[c] = least[c] if dead[c] else min(least[c], best)
 
 
 @kernel
@@ -220,13 +233,14 @@ def arrive(
     tick: int,
     latest: int,
     dead: Booleans,
+    end: int,
     least: NDArray[np.int16],
 ) -> None:
-    """Lower `least` (C,) where a motion (J,) reaches the goal, `goal_m` from the first cell."""
+    """Lower `least` (C,) up to `end` where a motion (J,) reaches the goal, at `goal_m`."""
     for j in range(len(way_m) - 1, -1, -1):
         begin = max(int((goal_m - way_m[j]) / CELL_M) - 1, 0)
         if tick + j + 1 > latest:
             continue
-        for c in range(begin, len(least)):
+        for c in range(begin, end):
             if not dead[c]:
                 least[c] = min(least[c], np.int16(tick + j + 1))

@@ -107,7 +107,7 @@ class Obstacles:
     length_m: Interval = Interval(4.0, 15.0)
     width_m: Interval = Interval(4.0, 15.0)
     gap_ego_m: Interval = Interval(2.0, 8.0)
-    gap_cross_m: Interval = Interval(2.0, 8.0)
+    gap_cross_m: Interval = Interval(2.0, 12.0)
     required: bool = False
 
     def __post_init__(self) -> None:

@@ -17,7 +17,8 @@ from risk_dqn_planner.ros.qos import DIAGNOSTICS
 from risk_dqn_planner.situation.inputs import EgoPose, object_arrays
 from sim_bridge.ros import topics
 from sim_bridge.ros.node_group import NodeGroup
-from sim_bridge.ros.pacing import DECISION_PERIOD_NS, LockStep, PlannerLink, WallPace, pass_time
+from sim_bridge.ros.pacing import LockStep, WallPace, pass_time
+from sim_bridge.ros.planner_link import DECISION_PERIOD_NS, PlannerLink
 from sim_bridge.ros.session import wait_until
 
 ANSWER_S = 10.0

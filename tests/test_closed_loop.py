@@ -2,8 +2,6 @@
 """The demo as users run it: real processes, a bag, a summary, pictures, and nothing left behind."""
 
 import json
-import os
-import signal
 import subprocess
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -21,7 +19,6 @@ from risk_dqn_planner.ros.conversions import to_ns
 from sim_bridge.ros import topics
 from sim_bridge.ros.recording import Bag, Stored, read_bag
 from sim_bridge.ros.run_settings import RunSettings
-from sim_bridge.ros.session import wait_until
 from sim_bridge.simulation import Simulation
 
 pytestmark = pytest.mark.ros
@@ -150,70 +147,3 @@ def test_the_nodes_decide_as_the_policy_does_in_the_batched_simulation(
     end_ns = run.bag().of(topics.EPISODE)[1].stamp_ns
     decisions = [d for d in decisions_of(run.bag()) if to_ns(d.header.stamp) < end_ns]
     assert [Action(decision.action) for decision in decisions] == expected
-
-
-@pytest.mark.parametrize(
-    ("options", "complaint"),
-    [
-        (["--map", "nowhere.osm", "--route", "1,2", "--origin", "49.0,8.4"], "nowhere.osm"),
-        (["--map", "atlantis"], "'atlantis'"),
-        (["--route", "1,424242"], "424242"),
-        (["--route", "left"], "'left'"),
-        (["--origin", "0.0,0.0"], "km from the origin"),
-        (["--scenario", "rush_hour"], "'rush_hour'"),
-        (["--policy", "nobody"], "'nobody'"),
-    ],
-    ids=lambda value: " ".join(value) if isinstance(value, list) else None,
-)
-def test_a_wrong_option_is_named_in_one_sentence(
-    tmp_path: Path, options: list[str], complaint: str
-) -> None:
-    done = run_demo(*options, "--out", str(tmp_path))
-    assert done.returncode == 2
-    assert complaint in done.stderr
-    assert len(done.stderr.strip().splitlines()) == 1, done.stderr
-
-
-def marked_processes(mark: str) -> list[str]:
-    """Processes that were started with this mark, and those started by them, however long ago."""
-    folders = Path("/proc").glob("[0-9]*")
-    return [folder.name for folder in folders if is_marked(folder, mark.encode())]
-
-
-def is_marked(process: Path, mark: bytes) -> bool:
-    try:
-        return mark in (process / "environ").read_bytes()
-    except OSError:  # it has just ended, or is not ours
-        return False
-
-
-@pytest.mark.parametrize("request_to_end", [signal.SIGINT, signal.SIGTERM], ids=lambda s: s.name)
-@pytest.mark.parametrize("driving", [False, True], ids=["while starting", "while driving"])
-def test_an_interrupted_demo_leaves_no_process_behind(
-    tmp_path: Path, request_to_end: signal.Signals, driving: bool
-) -> None:
-    mark = f"DEMO_STARTED_BY_TEST={tmp_path}"
-    name, value = mark.split("=")
-    demo = subprocess.Popen(
-        demo_command("--rate", "1.0", "--out", str(tmp_path)),
-        env=os.environ | {name: value},
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    log = tmp_path / "log" / "policy_node.log"
-
-    def is_time() -> bool:
-        if driving:
-            return log.is_file() and "deciding" in log.read_text("utf-8")
-        return len(marked_processes(mark)) >= 4
-
-    try:
-        wait_until(is_time, "the nodes to start", PATIENCE_S, lambda: None)
-        demo.send_signal(request_to_end)
-        _, errors = demo.communicate(timeout=PATIENCE_S)
-    finally:
-        demo.terminate()
-    assert demo.returncode == 130
-    assert "Traceback" not in errors
-    assert marked_processes(mark) == []

@@ -59,12 +59,17 @@ def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
 
 
 def _clear(folder: Path) -> None:
-    """Remove what an earlier run left, and nothing else."""
-    shutil.rmtree(folder / "bag", ignore_errors=True)
-    for old in (*folder.glob("episode_*.png"), folder / "summary.json"):
-        old.unlink(missing_ok=True)
+    """Make the folder and remove what an earlier run left there, but nothing else.
+
+    Raises:
+        ConfigurationError: nothing can be written there.
+    """
     try:
         folder.mkdir(parents=True, exist_ok=True)
+        for old in (*folder.glob("episode_*.png"), folder / "summary.json"):
+            old.unlink(missing_ok=True)
+        if (folder / "bag").exists():
+            shutil.rmtree(folder / "bag")
     except OSError as error:
         raise ConfigurationError(f"cannot write to {folder}: {error.strerror}") from error
 

@@ -5,7 +5,8 @@ from collections.abc import Callable
 
 from risk_dqn_planner.decision import Action
 from risk_dqn_planner.ros.conversions import SECOND_NS
-from sim_bridge.ros.pacing import DECISION_PERIOD_NS, EPISODE_GAP_NS, Pacing, pass_time
+from sim_bridge.ros.pacing import Pacing, pass_time
+from sim_bridge.ros.planner_link import DECISION_PERIOD_NS, EPISODE_GAP_NS
 from sim_bridge.ros.publishing import FramePublisher
 from sim_bridge.simulation import Simulation, StepResult
 

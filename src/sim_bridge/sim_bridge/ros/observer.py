@@ -12,7 +12,7 @@ from rclpy.serialization import deserialize_message
 
 from risk_dqn_planner.errors import PlannerError
 from risk_dqn_planner.ros.conversions import to_ns
-from sim_bridge.ros.pacing import DECISION_PERIOD_NS
+from sim_bridge.ros.planner_link import DECISION_PERIOD_NS
 from sim_bridge.ros.recording import Stored, stamp_of
 from sim_bridge.ros.topics import ALL, DECISION, EPISODE, ROUTE, Topic
 

@@ -12,7 +12,7 @@ from pathlib import Path
 from risk_dqn_planner.errors import PlannerError
 from sim_bridge.maps import map_names
 from sim_bridge.ros.drive import drive
-from sim_bridge.ros.pacing import DECISION_PERIOD_NS
+from sim_bridge.ros.planner_link import DECISION_PERIOD_NS
 from sim_bridge.ros.recording import BagWriter, Stored
 from sim_bridge.ros.run_settings import RunSettings, own_map_settings
 from sim_bridge.ros.summary import episode_result

@@ -15,7 +15,8 @@ from rclpy.serialization import deserialize_message
 from risk_dqn_planner.errors import BagError, ConfigurationError
 from sim_bridge.ros.comparison import Difference, difference
 from sim_bridge.ros.node_group import NodeGroup
-from sim_bridge.ros.pacing import EPISODE_GAP_NS, LockStep, PlannerLink, WallPace, pass_time
+from sim_bridge.ros.pacing import LockStep, WallPace, pass_time
+from sim_bridge.ros.planner_link import EPISODE_GAP_NS, PlannerLink
 from sim_bridge.ros.process import ParameterValue
 from sim_bridge.ros.recording import Stored, read_bag
 from sim_bridge.ros.run_settings import from_notes

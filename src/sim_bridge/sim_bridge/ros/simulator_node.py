@@ -4,80 +4,25 @@
 import queue
 import sys
 import threading
-from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from intersection_msgs.srv import ResetEpisode
-from rcl_interfaces.msg import ParameterDescriptor
-from rclpy.exceptions import ParameterException
 from rclpy.node import Node
-from rclpy.parameter import Parameter
 
-from risk_dqn_planner.errors import ConfigurationError, PlannerError
+from risk_dqn_planner.errors import PlannerError
 from risk_dqn_planner.ros.clock import steady_timer
 from risk_dqn_planner.ros.main import run
 from risk_dqn_planner.ros.parameters import MapParameters, declare
 from sim_bridge.ros.building import SimulationShelf
 from sim_bridge.ros.episodes import EpisodePlayer
-from sim_bridge.ros.pacing import LockStep, PlannerLink, RealTime, WallPace
+from sim_bridge.ros.pacing import LockStep, RealTime, WallPace
+from sim_bridge.ros.planner_link import PlannerLink
 from sim_bridge.ros.publishing import FramePublisher
+from sim_bridge.ros.simulator_parameters import SimulatorParameters, declare_route
 from sim_bridge.simulation import Simulation
 
 _WATCH_PERIOD_S = 0.2
 _PATIENCE_S = 10.0
-
-
-@dataclass(frozen=True)
-class SimulatorParameters:
-    """What is simulated, and how fast."""
-
-    scenario: str = field(
-        default="demo_light",
-        metadata={"description": "Name of a scenario, or a scenario file ending in .yaml"},
-    )
-    seed: int = field(
-        default=0,
-        metadata={
-            "description": "Seed of the first episode; the next ones count on",
-            "minimum": 0,
-            "maximum": 2**31 - 1,
-        },
-    )
-    autostart: bool = field(
-        default=True,
-        metadata={"description": "Start episodes one after the other without being asked"},
-    )
-    lockstep: bool = field(
-        default=True,
-        metadata={
-            "description": "Simulated time waits for the planner: the same decisions on every "
-            "computer; else the newest decision counts"
-        },
-    )
-    real_time_factor: float = field(
-        default=1.0,
-        metadata={
-            "description": "Highest ratio of simulated to real time; 0 for as fast as possible",
-            "minimum": 0.0,
-            "maximum": 100.0,
-        },
-    )
-    decision_timeout_s: float = field(
-        default=5.0,
-        metadata={
-            "description": "In lock-step, a decision that takes longer in real time counts as "
-            "late and the ego brakes [s]",
-            "minimum": 0.01,
-            "maximum": 600.0,
-        },
-    )
-
-    def __post_init__(self) -> None:
-        if not self.lockstep and self.real_time_factor == 0.0:
-            raise ConfigurationError(
-                "parameter real_time_factor is 0 without lockstep, expected a number above 0: "
-                "nobody would wait for the planner"
-            )
 
 
 class _Request(NamedTuple):
@@ -92,7 +37,7 @@ class SimulatorNode(Node):
         super().__init__("simulator")
         maps = declare(self, MapParameters)
         self._config = declare(self, SimulatorParameters)
-        self._shelf = SimulationShelf(maps.load(), self._declare_route())
+        self._shelf = SimulationShelf(maps.load(), declare_route(self))
         first = self._shelf.get(self._config.scenario)
         self._publisher = FramePublisher(self, maps.map_frame)
         self._publisher.publish_route(first, 0)
@@ -107,19 +52,6 @@ class SimulatorNode(Node):
         self._worker = threading.Thread(target=self._work, name="episodes", daemon=True)
         self._worker.start()
         self.get_logger().info(f"ready on {maps.map_file}")
-
-    def _declare_route(self) -> list[int]:
-        name = "route"
-        descriptor = ParameterDescriptor(
-            description="Lanelets of the ego's route in driving order (required)", read_only=True
-        )
-        try:
-            self.declare_parameter(name, Parameter.Type.INTEGER_ARRAY, descriptor)
-            return list(self.get_parameter(name).value)
-        except ParameterException as error:
-            raise ConfigurationError(
-                "parameter route is not set, expected a list of lanelet ids such as [1, 9, 4]"
-            ) from error
 
     def _on_reset(
         self, request: ResetEpisode.Request, response: ResetEpisode.Response

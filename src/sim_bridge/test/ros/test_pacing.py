@@ -6,13 +6,8 @@ import pytest
 from intersection_msgs.msg import Decision, Situation
 
 from risk_dqn_planner.ros.conversions import SECOND_NS, to_ns, to_stamp
-from sim_bridge.ros.pacing import (
-    DECISION_PERIOD_NS,
-    LockStep,
-    Mailbox,
-    RealTime,
-    WallPace,
-)
+from sim_bridge.ros.pacing import LockStep, RealTime, WallPace
+from sim_bridge.ros.planner_link import DECISION_PERIOD_NS, Mailbox
 
 LONG_S = 30.0  # a test that waits this long has failed
 

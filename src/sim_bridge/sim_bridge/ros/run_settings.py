@@ -18,6 +18,9 @@ DEFAULT_PROJECTOR = "utm"
 DEFAULT_POLICY = "rule_based"
 DEFAULT_SCENARIO = "demo_light"
 
+# Lock-step has time: on a busy computer a situation may reach the policy long after the clock.
+_LOCKSTEP: dict[str, ParameterValue] = {"use_sim_time": True, "sim_time_patience_s": 1.0}
+
 
 @dataclass(frozen=True)
 class RunSettings:
@@ -49,7 +52,6 @@ class RunSettings:
 
     def _map_parameters(self) -> dict[str, ParameterValue]:
         return {
-            "use_sim_time": True,
             "map_file": str(self.map_file.resolve()),
             "map_origin_latitude": self.origin.latitude_deg,
             "map_origin_longitude": self.origin.longitude_deg,
@@ -65,10 +67,11 @@ class RunSettings:
         sensor_range_m = load_scenario(self.scenario).sensor.range_m
         situation = {
             **self._map_parameters(),
+            **_LOCKSTEP,
             "sensor_range_m": sensor_range_m,
             **self.overrides,
         }
-        policy = {"use_sim_time": True, "policy": self.policy, **self.overrides}
+        policy = {**_LOCKSTEP, "policy": self.policy, **self.overrides}
         package = "risk_dqn_planner"
         return [
             NodeCommand(package, "situation_node", situation, remappings("situation")),

@@ -152,6 +152,7 @@ class Simulation:
             world.paths,
             world.lanes,
             world.sharing,
+            world.crossings,
             world.ego_sharing,
             world.obstacles.corners,
             self.settings,

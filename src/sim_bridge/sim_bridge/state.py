@@ -47,7 +47,8 @@ class Vehicles(NamedTuple):
     the path; acceleration_mps2: of the last inner step; yields: lets the ego go first;
     follows_ego: has taken the ego for its leader. leader: place of the vehicle ahead, -1 none;
     leader_offset_m: what to add to the leader's s to have it on the own path. Drivers look for
-    their leader once per decision period.
+    their leader once per decision period. hold_m: arc length before which to wait for
+    others to cross, infinity for going on.
     """
 
     driving: Booleans
@@ -62,6 +63,7 @@ class Vehicles(NamedTuple):
     follows_ego: Booleans
     leader: Integers
     leader_offset_m: Floats
+    hold_m: Floats
 
 
 class Counts(NamedTuple):
@@ -146,4 +148,5 @@ def _empty_vehicles(batch: int, vehicles: int) -> Vehicles:
         follows_ego=np.zeros(shape, dtype=np.bool_),
         leader=np.full(shape, NOBODY, dtype=np.int64),
         leader_offset_m=np.zeros(shape),
+        hold_m=np.full(shape, np.inf),
     )

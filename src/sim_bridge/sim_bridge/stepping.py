@@ -12,10 +12,17 @@ from risk_dqn_planner.situation.situations import Floats, Integers
 from sim_bridge.dynamics import accelerate, follow_target, target_speed
 from sim_bridge.path_geometry import table_pose
 from sim_bridge.population import come_and_go
+from sim_bridge.right_of_way import Crossings, give_way
 from sim_bridge.settings import Settings
 from sim_bridge.sharing import EgoSharing, Sharing
 from sim_bridge.state import NO_ACTION, Counts, Episodes, SimulationState, Vehicles
-from sim_bridge.traffic import find_leaders, follow_egos, follow_leaders, yield_to_egos
+from sim_bridge.traffic import (
+    find_leaders,
+    follow_egos,
+    follow_leaders,
+    wait_for_others,
+    yield_to_egos,
+)
 from sim_bridge.world import EgoLane, Lanes, Paths
 
 # A decision step that takes more than this off the ego's speed counts as hard braking.
@@ -29,6 +36,7 @@ def advance(
     paths: Paths,
     lanes: Lanes,
     sharing: Sharing,
+    crossings: Crossings,
     ego_sharing: EgoSharing,
     corners: Floats,
     settings: Settings,
@@ -46,9 +54,13 @@ def advance(
     for _ in range(steps):
         come_and_go(ego, paths, lanes, sharing, corners, settings, episodes, vehicles)
         find_leaders(sharing, episodes, vehicles)
+        if crossings.exist:
+            give_way(crossings, idm, episodes, vehicles)
         count_decisions(episodes, counts, actions)
         follow_leaders(paths.vehicle_length_m, idm, episodes, vehicles)
         follow_egos(lengths_m, first_zone_m, ego_sharing, idm, episodes, vehicles)
+        if crossings.exist:
+            wait_for_others(idm, episodes, vehicles)
         if settings.draws.yielding_share > 0.0:
             yield_to_egos(paths, lanes, idm, episodes, vehicles)
         move_vehicles(

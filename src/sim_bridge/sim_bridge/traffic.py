@@ -165,6 +165,18 @@ def follow_egos(
 
 
 @kernel
+def wait_for_others(idm: Idm, episodes: Episodes, vehicles: Vehicles) -> None:
+    """Let vehicles that have to wait where paths cross stop before."""
+    hold_m, s_m = vehicles.hold_m, vehicles.s_m
+    batch, count = hold_m.shape
+    for b in range(batch):
+        for i in range(count):
+            # Who is too near to stop goes on, and is waited for.
+            if hold_m[b, i] < math.inf and hold_m[b, i] > s_m[b, i] and episodes.running[b]:
+                _brake_behind(vehicles, b, i, hold_m[b, i] - s_m[b, i], 0.0, idm)
+
+
+@kernel
 def yield_to_egos(
     paths: Paths, lanes: Lanes, idm: Idm, episodes: Episodes, vehicles: Vehicles
 ) -> None:

@@ -17,6 +17,7 @@ from sim_bridge.contact import contact_intervals
 from sim_bridge.matches import Matches, match_table
 from sim_bridge.obstacles import Catalogue, obstacle_catalogue
 from sim_bridge.path_geometry import SPACING_M, sampled
+from sim_bridge.right_of_way import Crossings, crossings
 from sim_bridge.scenario_fields import Scenario
 from sim_bridge.sharing import (
     EgoSharing,
@@ -100,6 +101,7 @@ class World(NamedTuple):
     paths: Paths
     lanes: Lanes
     sharing: Sharing
+    crossings: Crossings
     ego_sharing: EgoSharing
     matches: Matches
     sight: SightLines
@@ -130,6 +132,7 @@ def build_world(
     traffic = traffic_lines(model, reach + _OUT_OF_REACH_M, _BEYOND_ZONE_M)
     entries = np.flatnonzero(traffic.enters)
     ego, paths = _tables(model, lanes, traffic, scenario.sensor.range_m)
+    shared = sharing(traffic.line, paths.table, model.traffic_dimensions)
     return World(
         ego=ego,
         paths=paths,
@@ -144,7 +147,8 @@ def build_world(
             ego_zone_m=np.array([lane.ego_zone_length_m for lane in model.lanes]),
             zone_m=np.array([lane.zone_length_m for lane in model.lanes]),
         ),
-        sharing=sharing(traffic.line, paths.table, model.traffic_dimensions),
+        sharing=shared,
+        crossings=crossings(paths.table, shared.low_m < np.inf, model.traffic_dimensions),
         ego_sharing=sharing_with_ego(model, lanes, traffic),
         matches=match_table(model, paths.table, paths.length_m),
         sight=sight_lines(model, scenario.sensor.range_m),

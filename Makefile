@@ -27,7 +27,7 @@ RUN_OPTIONS = $(call option,--map,MAP) $(call option,--route,ROUTE) $(call optio
   $(call option,--scenario,SCENARIO) $(call option,--episodes,EPISODES) $(call option,--seed,SEED) \
   $(call option,--rate,RATE) $(call option,--out,OUT)
 
-.PHONY: help setup demo test replay bags maps bench shell format lint types check clean distclean
+.PHONY: help setup demo test replay bags maps train evaluate bench shell format lint types check clean distclean
 
 help: ## list the targets
 	@echo 'make TARGET, where TARGET is one of'
@@ -51,6 +51,17 @@ bags: ## record the bags in bags/ again
 
 maps: ## draw the project's own maps again
 	@$(WITH_ROS) $(SIMULATION)/draw_maps $(ARGS)
+
+train: ## train a DQN, or go on with it [PRESET REWARD SEED STEPS MAP ROUTE ORIGIN SCENARIO NAME OUT]
+	@$(WITH_ROS) $(SIMULATION)/train $(call option,--preset,PRESET) $(call option,--reward,REWARD) \
+	  $(call option,--seed,SEED) $(call option,--steps,STEPS) $(call option,--map,MAP) \
+	  $(call option,--route,ROUTE) $(call option,--origin,ORIGIN) \
+	  $(call option,--scenario,SCENARIO) $(call option,--name,NAME) $(call option,--out,OUT) $(ARGS)
+
+evaluate: ## drive policies through the paper's cells [EPISODES POLICIES SCENARIOS MAP ROUTE ORIGIN]
+	@$(WITH_ROS) $(SIMULATION)/evaluate $(call option,--episodes,EPISODES) \
+	  $(call option,--policies,POLICIES) $(call option,--scenarios,SCENARIOS) \
+	  $(call option,--map,MAP) $(call option,--route,ROUTE) $(call option,--origin,ORIGIN) $(ARGS)
 
 bench: ## run the benchmarks
 	@$(WITH_ROS) bash -c 'for script in src/*/benchmarks/bench_*.py; do \

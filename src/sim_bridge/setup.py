@@ -45,9 +45,11 @@ setup(
         "console_scripts": [
             "demo = sim_bridge.ros.demo:main",
             "draw_maps = sim_bridge.maps.draw:main",
+            "evaluate = sim_bridge.evaluation.evaluate:main",
             "record = sim_bridge.ros.record:main",
             "replay = sim_bridge.ros.replay:main",
             "simulator_node = sim_bridge.ros.simulator_node:main",
+            "train = sim_bridge.learning.train:main",
         ],
     },
 )

@@ -75,7 +75,7 @@ format: ## format the Python sources
 	@$(WITH_TOOLS) ruff check --select I --fix $(PYTHON_SOURCES)
 
 lint: ## check style and formatting
-	@$(WITH_TOOLS) ruff check .
+	@$(WITH_TOOLS) ruff check --no-cache .
 	@$(WITH_TOOLS) ruff format --check .
 
 types: ## check types, strictly

@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 import torch
 from numpy.typing import NDArray
-from risk_dqn_planner.policies.network import RiskDqn
 from torch.nn.utils import parameters_to_vector, vector_to_parameters
 
+from risk_dqn_planner.policies.network import RiskDqn
 from sim_bridge.learning import compiled_network
 from sim_bridge.learning.compiled_network import FEATURES, empty_signals
 from sim_bridge.learning.config import LearnerConfig

@@ -15,7 +15,7 @@ from sim_bridge.settings import Settings
 from sim_bridge.sight_lines import SightLines
 from sim_bridge.state import Episodes, Vehicles
 from sim_bridge.visibility import HALF_PLANES, cast_shadows, first_hidden, point_hidden
-from sim_bridge.world import EgoLane, World
+from sim_bridge.world import EgoLane, Lanes
 
 # Errors of perceived speeds are numbered by inner step and vehicle id.
 _MOST_IDS = 1 << 20
@@ -213,42 +213,48 @@ def match_vehicles(
 
 @kernel
 def perceive(
-    world: World,
+    ego: EgoLane,
+    table: Floats,
+    lanes: Lanes,
+    matches: Matches,
+    sight: SightLines,
+    corners: Floats,
     settings: Settings,
     episodes: Episodes,
     vehicles: Vehicles,
     view: View,
     situations: Situations,
 ) -> None:
-    """Fill the situations of all episodes; what describes the lanes for good must be there."""
-    look(world.ego, world.obstacles.corners, settings.sensor_offset_m, episodes, view)
-    perceive_egos(world.ego, world.lanes.ego_zone_center_m, episodes, situations)
-    perceive_lanes(
-        world.lanes.first_path,
-        world.sight,
-        settings.sensor_range_m,
-        view,
-        situations.lane_hidden_distance_m,
-    )
-    see_vehicles(
-        world.paths.table, settings, episodes, vehicles, view, view.seen, view.measured_mps
-    )
-    match_vehicles(world.matches, vehicles, view.seen, view.measured_mps, situations)
+    """Fill the situations of all episodes; what describes the lanes for good must be there.
+
+    table: of Paths; corners (2, K, 4, 2): catalogue of the obstacles.
+    """
+    look(ego, corners, settings.sensor_offset_m, episodes, view)
+    perceive_egos(ego, lanes.ego_zone_center_m, episodes, situations)
+    range_m, hidden_m = settings.sensor_range_m, situations.lane_hidden_distance_m
+    perceive_lanes(lanes.first_path, sight, range_m, view, hidden_m)
+    see_vehicles(table, settings, episodes, vehicles, view, view.seen, view.measured_mps)
+    match_vehicles(matches, vehicles, view.seen, view.measured_mps, situations)
 
 
 @kernel
 def reveal(
-    world: World,
+    ego: EgoLane,
+    table: Floats,
+    corners: Floats,
     settings: Settings,
     episodes: Episodes,
     vehicles: Vehicles,
     view: View,
     poses: VehiclePoses,
 ) -> None:
-    """Fill the truth about all vehicles, and whether the ego sees them."""
-    table, path, s_m = world.paths.table, vehicles.path, vehicles.s_m
+    """Fill the poses of all vehicles, and in the view which of them the ego sees.
+
+    table: of Paths; corners (2, K, 4, 2): catalogue of the obstacles.
+    """
+    path, s_m = vehicles.path, vehicles.s_m
     x_m, y_m, heading_rad = poses.x_m, poses.y_m, poses.heading_rad
-    look(world.ego, world.obstacles.corners, settings.sensor_offset_m, episodes, view)
+    look(ego, corners, settings.sensor_offset_m, episodes, view)
     see_vehicles(table, settings, episodes, vehicles, view, view.seen, view.measured_mps)
     for b in range(path.shape[0]):
         for i in range(path.shape[1]):

@@ -30,12 +30,14 @@ from sim_bridge.state import (
     SimulationState,
     Vehicles,
 )
-from sim_bridge.visibility import HALF_PLANES, cast_shadows, point_hidden
+from sim_bridge.visibility import cast_shadows, point_hidden
 from sim_bridge.world import EgoLane, Lanes, Paths
 
 # How often a place is drawn for a vehicle before it is left to come in from upstream.
 _ATTEMPTS = 12
 _DRAWS_PER_VEHICLE = 4
+# Numbers within a stream.
+_PLACE, _SPEED = np.int64(0), np.int64(1)
 # Between footprints, on whatever lanes.
 _CLEARANCE_M = 0.5
 
@@ -121,15 +123,15 @@ def entry_in_sight(
 ) -> bool:
     """Tell whether the ego sees where vehicles enter on path p.
 
-    corners (2, K, 4, 2): catalogue of the obstacles; shadows (1, O, 4, 3): memory to work in.
+    corners (2, K, 4, 2): catalogue of the obstacles; shadows (B, O, 4, 3): memory to work in.
     """
     x, y, _ = table_pose(paths.table, p, 0.0)
     sensor_x, sensor_y, heading = table_pose(ego.table, 0, episodes.ego_s_m[b])
     sensor_x += settings.sensor_offset_m * math.cos(heading)
     sensor_y += settings.sensor_offset_m * math.sin(heading)
-    count = cast_shadows(corners, episodes.obstacle, b, sensor_x, sensor_y, shadows, 0)
+    count = cast_shadows(corners, episodes.obstacle, b, sensor_x, sensor_y, shadows, b)
     range_m = settings.sensor_range_m
-    return not point_hidden(x, y, sensor_x, sensor_y, range_m, shadows, 0, count)
+    return not point_hidden(x, y, sensor_x, sensor_y, range_m, shadows, b, count)
 
 
 @kernel
@@ -142,11 +144,13 @@ def come_and_go(
     settings: Settings,
     episodes: Episodes,
     vehicles: Vehicles,
+    shadows: Floats,
 ) -> None:
     """Where a decision is due, replace vehicles that have left and let waiting ones in.
 
     Nobody appears out of nothing: an entry within the sensor's range must be out of sight.
-    Notes whether leaders have to be found anew. corners (2, K, 4, 2): the obstacles' catalogue.
+    Notes whether leaders have to be found anew. corners (2, K, 4, 2): the obstacles' catalogue;
+    shadows (B, O, 4, 3): memory to work in.
     """
     driving, waiting, path, s_m = vehicles.driving, vehicles.waiting, vehicles.path, vehicles.s_m
     speed_mps, desired_mps = vehicles.speed_mps, vehicles.desired_speed_mps
@@ -157,7 +161,6 @@ def come_and_go(
     first_entry, entry_path = lanes.first_entry, lanes.entry_path
     change_low_m, change_high_m = sharing.change_low_m, sharing.change_high_m
     draws, gap_m = settings.draws, settings.idm.standstill_gap_m
-    shadows = np.empty((1, episodes.obstacle.shape[1], HALF_PLANES, 3))
     batch, count = driving.shape
     for b in range(batch):
         if not running[b] or phase[b] != 0:
@@ -216,10 +219,10 @@ def start_egos(
             continue
         seed = episodes.seed[b]
         low, high = draws.ego_distance_m
-        before = random_between(seed, EGO_STREAM, 0, low, min(high, stop_line_m))
+        before = random_between(seed, EGO_STREAM, _PLACE, low, min(high, stop_line_m))
         episodes.ego_s_m[b] = counts.start_s_m[b] = stop_line_m - before
         low, high = draws.ego_speed_mps
-        episodes.ego_speed_mps[b] = random_between(seed, EGO_STREAM, 1, low, high)
+        episodes.ego_speed_mps[b] = random_between(seed, EGO_STREAM, _SPEED, low, high)
         counts.action_changes[b] = 0
         counts.last_action[b] = NO_ACTION
         counts.hard_brakes[b] = 0
@@ -261,7 +264,7 @@ def start_traffic(
         if not mask[b]:
             continue
         seed = seeds[b]
-        count = fewest + random_index(seed, COUNT_STREAM, 0, most - fewest + 1)
+        count = fewest + random_index(seed, COUNT_STREAM, _PLACE, most - fewest + 1)
         next_id[b] = count + 1
         for i in range(driving.shape[1]):
             driving[b, i] = False

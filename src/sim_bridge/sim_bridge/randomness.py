@@ -12,13 +12,14 @@ import numpy as np
 
 from risk_dqn_planner.compiled import kernel
 
-# What a number is drawn for; every stream has its own sequence.
-EGO_STREAM = 0
-OBSTACLE_STREAM = 1
-COUNT_STREAM = 2
-VEHICLE_STREAM = 3
-PLACE_STREAM = 4
-NOISE_STREAM = 5
+# What a number is drawn for; every stream has its own sequence. Written as numpy's numbers, because
+# kernels are compiled anew for each of Python's.
+EGO_STREAM = np.int64(0)
+OBSTACLE_STREAM = np.int64(1)
+COUNT_STREAM = np.int64(2)
+VEHICLE_STREAM = np.int64(3)
+PLACE_STREAM = np.int64(4)
+NOISE_STREAM = np.int64(5)
 
 _GOLDEN = np.uint64(0x9E3779B97F4A7C15)
 _FIRST = np.uint64(0xBF58476D1CE4E5B9)
@@ -37,7 +38,7 @@ def _mix(bits: np.uint64) -> np.uint64:
 
 
 @kernel
-def random_bits(seed: np.uint64, stream: int, index: int) -> np.uint64:
+def random_bits(seed: np.uint64, stream: np.int64, index: np.int64 | int) -> np.uint64:
     """Return 64 random bits."""
     key = _mix(np.uint64(seed) + _GOLDEN)
     key = _mix(key + (np.uint64(stream) + _ONE) * _GOLDEN)
@@ -45,25 +46,27 @@ def random_bits(seed: np.uint64, stream: int, index: int) -> np.uint64:
 
 
 @kernel
-def random_share(seed: np.uint64, stream: int, index: int) -> float:
+def random_share(seed: np.uint64, stream: np.int64, index: np.int64 | int) -> float:
     """Return a number uniform in [0, 1)."""
     return np.float64(random_bits(seed, stream, index) >> _SHIFT_11) * 2.0**-53
 
 
 @kernel
-def random_between(seed: np.uint64, stream: int, index: int, low: float, high: float) -> float:
+def random_between(
+    seed: np.uint64, stream: np.int64, index: np.int64 | int, low: float, high: float
+) -> float:
     """Return a number uniform in [low, high)."""
     return low + (high - low) * random_share(seed, stream, index)
 
 
 @kernel
-def random_index(seed: np.uint64, stream: int, index: int, count: int) -> int:
+def random_index(seed: np.uint64, stream: np.int64, index: np.int64 | int, count: int) -> int:
     """Return a whole number uniform in 0 .. count - 1."""
     return min(int(random_share(seed, stream, index) * count), count - 1)
 
 
 @kernel
-def random_normal(seed: np.uint64, stream: int, index: int) -> float:
+def random_normal(seed: np.uint64, stream: np.int64, index: np.int64 | int) -> float:
     """Return a standard normal number (Box and Muller 1958); uses the indices 2i and 2i + 1."""
     radius = math.sqrt(-2.0 * math.log(1.0 - random_share(seed, stream, 2 * index)))
     return radius * math.cos(2.0 * math.pi * random_share(seed, stream, 2 * index + 1))

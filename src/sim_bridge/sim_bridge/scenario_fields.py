@@ -76,7 +76,7 @@ class Traffic:
     a new vehicle. yielding_share: of vehicles that let the ego go first; the paper has none.
     """
 
-    vehicles: Interval = Interval(0, 5)
+    vehicles: Interval = Interval(1, 6)
     start_distance_m: Interval = Interval(10.0, 80.0)
     desired_speed_mps: Interval = Interval(3.5, 7.0)
     headway_s: float = 1.5
@@ -107,7 +107,7 @@ class Obstacles:
     length_m: Interval = Interval(4.0, 15.0)
     width_m: Interval = Interval(4.0, 15.0)
     gap_ego_m: Interval = Interval(2.0, 8.0)
-    gap_cross_m: Interval = Interval(2.0, 12.0)
+    gap_cross_m: Interval = Interval(3.0, 11.0)
     required: bool = False
 
     def __post_init__(self) -> None:

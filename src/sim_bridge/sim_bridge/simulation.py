@@ -158,6 +158,7 @@ class Simulation:
             self.settings,
             self.state,
             given,
+            self._view.shadows,
             steps,
         )
         return StepResult(
@@ -176,7 +177,20 @@ class Simulation:
         """
         result = out if out is not None else self._empty_situations()
         episodes, vehicles, _ = self.state
-        perceive(self.world, self.settings, episodes, vehicles, self._view, result)
+        world = self.world
+        perceive(
+            world.ego,
+            world.paths.table,
+            world.lanes,
+            world.matches,
+            world.sight,
+            world.obstacles.corners,
+            self.settings,
+            episodes,
+            vehicles,
+            self._view,
+            result,
+        )
         return result
 
     def _empty_situations(self) -> Situations:
@@ -226,8 +240,17 @@ class Simulation:
             measured_speed_mps=np.zeros(shape),
             hidden=np.zeros(shape, dtype=np.bool_),
         )
-        view = self._view
-        reveal(self.world, self.settings, episodes, vehicles, view, poses)
+        world, view = self.world, self._view
+        reveal(
+            world.ego,
+            world.paths.table,
+            world.obstacles.corners,
+            self.settings,
+            episodes,
+            vehicles,
+            view,
+            poses,
+        )
         poses.hidden[:] = vehicles.driving & ~view.seen
         poses.measured_speed_mps[:] = view.measured_mps
         return poses

@@ -42,17 +42,18 @@ def advance(
     settings: Settings,
     state: SimulationState,
     actions: Integers,
+    shadows: Floats,
     steps: int,
 ) -> None:
     """Take all running episodes `steps` inner steps further under their actions (B,).
 
-    corners (2, K, 4, 2): catalogue of the obstacles.
+    corners (2, K, 4, 2): catalogue of the obstacles; shadows (B, O, 4, 3): memory to work in.
     """
     episodes, vehicles, counts = state.episodes, state.vehicles, state.counts
     idm, first_zone_m = settings.idm, ego.first_zone_m
     lengths_m = 0.5 * (ego.length_m + paths.vehicle_length_m)
     for _ in range(steps):
-        come_and_go(ego, paths, lanes, sharing, corners, settings, episodes, vehicles)
+        come_and_go(ego, paths, lanes, sharing, corners, settings, episodes, vehicles, shadows)
         find_leaders(sharing, episodes, vehicles)
         if crossings.exist:
             give_way(crossings, idm, episodes, vehicles)

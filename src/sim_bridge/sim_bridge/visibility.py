@@ -20,14 +20,10 @@ HALF_PLANES = 4
 
 
 @kernel
-def _half_plane(
-    shadows: Floats, b: int, o: int, row: int, x1: float, y1: float, x2: float, y2: float
-) -> None:
-    """Store the half-plane left of the directed line from point 1 to point 2."""
+def _left_of(x1: float, y1: float, x2: float, y2: float) -> tuple[float, float, float]:
+    """Return the half-plane left of the directed line from point 1 to point 2."""
     nx, ny = y1 - y2, x2 - x1
-    shadows[b, o, row, 0] = nx
-    shadows[b, o, row, 1] = ny
-    shadows[b, o, row, 2] = nx * x1 + ny * y1
+    return nx, ny, nx * x1 + ny * y1
 
 
 @kernel
@@ -46,8 +42,12 @@ def cast_shadow(
     for edge in range(4):
         ax, ay = catalogue[side, k, edge, 0], catalogue[side, k, edge, 1]
         bx, by = catalogue[side, k, (edge + 1) % 4, 0], catalogue[side, k, (edge + 1) % 4, 1]
-        if (bx - ax) * (y - ay) - (by - ay) * (x - ax) < 0.0:
-            _half_plane(shadows, b, o, faces, ax, ay, bx, by)
+        nx, ny, offset = _left_of(ax, ay, bx, by)
+        if nx * x + ny * y < offset:
+            # The other row is kept equal until there is a second facing edge.
+            for row in range(faces, 2):
+                shadows[b, o, row, 0], shadows[b, o, row, 1] = nx, ny
+                shadows[b, o, row, 2] = offset
             faces += 1
             if first < 0 or (last + 1) % 4 != edge:
                 first = edge
@@ -57,15 +57,12 @@ def cast_shadow(
         for row in range(HALF_PLANES):
             shadows[b, o, row, 0], shadows[b, o, row, 1], shadows[b, o, row, 2] = 0.0, 0.0, -1.0
         return
-    if faces == 1:
-        for column in range(3):
-            shadows[b, o, 1, column] = shadows[b, o, 0, column]
     # The chain runs counter-clockwise around the rectangle, clockwise as seen from the sensor.
     end = (last + 1) % 4
-    ax, ay = catalogue[side, k, first, 0], catalogue[side, k, first, 1]
-    _half_plane(shadows, b, o, 2, ax, ay, x, y)
-    ax, ay = catalogue[side, k, end, 0], catalogue[side, k, end, 1]
-    _half_plane(shadows, b, o, 3, x, y, ax, ay)
+    tangent = _left_of(catalogue[side, k, first, 0], catalogue[side, k, first, 1], x, y)
+    shadows[b, o, 2, 0], shadows[b, o, 2, 1], shadows[b, o, 2, 2] = tangent
+    tangent = _left_of(x, y, catalogue[side, k, end, 0], catalogue[side, k, end, 1])
+    shadows[b, o, 3, 0], shadows[b, o, 3, 1], shadows[b, o, 3, 2] = tangent
 
 
 @kernel

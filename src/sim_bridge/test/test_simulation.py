@@ -8,10 +8,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from risk_dqn_planner.errors import ConfigurationError
+from risk_dqn_planner.intersection.builder import build_intersection
 from risk_dqn_planner.intersection.model import IntersectionModel
+from risk_dqn_planner.map.loader import load_map
 from risk_dqn_planner.situation.builder import SituationBuilder
 from risk_dqn_planner.situation.inputs import EgoPose, ObjectArrays
-from sim_bridge.scenario import Scenario
+from sim_bridge.maps import shipped_map
+from sim_bridge.scenario import Scenario, load_scenario
 from sim_bridge.scenario_fields import EgoStart, Interval, Obstacles, Sensor
 from sim_bridge.simulation import Simulation
 
@@ -412,3 +415,27 @@ def test_wrong_input_is_named(
 def test_an_empty_batch_is_refused(crossing_model: IntersectionModel, empty_road: Scenario):
     with pytest.raises(ConfigurationError, match="batch is 0"):
         Simulation(crossing_model, empty_road, 0)
+
+
+@pytest.mark.parametrize("name", ["t_junction", "roundabout"])
+def test_no_hidden_vehicle_is_nearer_than_the_distance_from_which_one_may_hide(
+    name: str, with_vehicles: WithVehicles
+):
+    place = shipped_map(name)
+    model = build_intersection(load_map(place.path, place.origin), place.route)
+    simulation = Simulation(model, with_vehicles(load_scenario("severe_occlusion"), 8), 30)
+    simulation.reset(np.arange(30))
+    vehicles, world = simulation.state.vehicles, simulation.world
+    checked = 0
+    for _ in range(60):
+        hidden_m = simulation.situations().lane_hidden_distance_m
+        poses = simulation.vehicle_poses()
+        lane = world.paths.lane[vehicles.path]
+        distance = world.paths.zone_m[vehicles.path] - vehicles.s_m
+        coming = poses.hidden & (distance > -0.5 * world.lanes.zone_m[lane])
+        least = np.take_along_axis(hidden_m, lane, axis=1)
+        # Sight lines are off their curves by 5 cm at most.
+        assert (distance[coming] >= least[coming] - 0.1).all()
+        checked += int(coming.sum())
+        simulation.step(np.full(30, SLOW))
+    assert checked > 1000

@@ -27,7 +27,7 @@ from sim_bridge.top_view import (
 
 _HALF_WIDTH_M = 42.0
 _PANEL_RATIO = 1.0
-_WIDTH_IN, _HEIGHT_IN, _DPI = 13.0, 5.2, 110
+_WIDTH_IN, _HEIGHT_IN, _DPI = 13.0, 5.6, 110
 _MOMENTS = 4
 
 
@@ -49,7 +49,7 @@ def save_episode_picture(
     _draw_course(figure.add_subplot(grid[1, :]), frames)
     if title:
         figure.suptitle(title, fontsize=11, y=0.995)
-        figure.set_layout_engine("constrained", rect=(0.0, 0.0, 1.0, 0.96))
+        figure.set_layout_engine("constrained", rect=(0.0, 0.0, 1.0, 0.94))
     figure.legend(
         handles=_legend(), loc="outside lower center", ncols=12, fontsize=7, frameon=False
     )
@@ -117,7 +117,7 @@ def _wrapped(text: str, width: int = 56) -> list[str]:
         if len(lines[-1]) + len(word) > width:
             lines.append("")
         lines[-1] += f"{word} "
-    return lines[:2]
+    return lines[:3]
 
 
 def _draw_course(axes: Axes, frames: Sequence[Frame]) -> None:

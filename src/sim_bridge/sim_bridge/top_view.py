@@ -85,7 +85,8 @@ def _across(path: LanePath, s: float) -> Floats:
     x, y = path.centerline.position(s)
     heading = path.centerline.heading_at(s)
     left = path.half_width_m * np.array([-np.sin(heading), np.cos(heading)])
-    return np.array([x, y]) + np.outer([1.0, -1.0], left)
+    ends: Floats = np.array([x, y]) + np.outer([1.0, -1.0], left)
+    return ends
 
 
 def _draw_vehicle(axes: Axes, vehicle: VehicleFrame, color: str) -> None:
@@ -93,10 +94,11 @@ def _draw_vehicle(axes: Axes, vehicle: VehicleFrame, color: str) -> None:
         vehicle.x_m, vehicle.y_m, vehicle.heading_rad, vehicle.length_m, vehicle.width_m
     )
     if vehicle.hidden:
-        style = {"facecolor": "none", "edgecolor": color, "ls": (0, (2, 1.5)), "lw": 1.2}
+        outline = Patch(corners, facecolor="none", edgecolor=color, ls=(0, (2, 1.5)), lw=1.2)
     else:
-        style = {"facecolor": color, "edgecolor": "black", "lw": 0.6}
-    axes.add_patch(Patch(corners, zorder=5, **style))
+        outline = Patch(corners, facecolor=color, edgecolor="black", lw=0.6)
+    outline.set_zorder(5)
+    axes.add_patch(outline)
     reach = 0.5 * vehicle.length_m + 0.6 * abs(vehicle.speed_mps)
     ahead = reach * np.array([np.cos(vehicle.heading_rad), np.sin(vehicle.heading_rad)])
     x, y = vehicle.x_m, vehicle.y_m

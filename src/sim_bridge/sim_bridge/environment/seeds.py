@@ -23,7 +23,7 @@ TRAINING_SEEDS = range(2_000_000_000, 4_000_000_000)
 def _draw(run_seed: int, episode: Seeds, start: int, count: int, seeds: Seeds) -> None:
     for environment in range(episode.shape[0]):
         seeds[environment] = start + random_index(
-            np.uint64(run_seed), environment, episode[environment], count
+            np.uint64(run_seed), np.int64(environment), episode[environment], count
         )
 
 

@@ -17,7 +17,7 @@ from risk_dqn_planner.ros.qos import DIAGNOSTICS
 from risk_dqn_planner.situation.inputs import EgoPose, object_arrays
 from sim_bridge.ros import topics
 from sim_bridge.ros.node_group import NodeGroup
-from sim_bridge.ros.pacing import LockStep, WallPace, pass_time
+from sim_bridge.ros.pacing import LockStep, WallPace
 from sim_bridge.ros.planner_link import DECISION_PERIOD_NS, PlannerLink
 from sim_bridge.ros.session import wait_until
 
@@ -137,7 +137,7 @@ class PlannerDriver:
     def pause(self) -> None:
         """Let 3 s pass without inputs, so that the planner forgets what was before."""
         until_ns = self.now_ns + 6 * DECISION_PERIOD_NS
-        pass_time(self._pacing, self.now_ns, until_ns)
+        self._pacing.pause(self.now_ns, until_ns)
         self.now_ns = until_ns - DECISION_PERIOD_NS
 
     def _answer(self) -> Decision:

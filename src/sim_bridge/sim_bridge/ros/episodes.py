@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 from risk_dqn_planner.decision import Action
 from risk_dqn_planner.ros.conversions import SECOND_NS
-from sim_bridge.ros.pacing import Pacing, pass_time
+from sim_bridge.ros.pacing import Pacing
 from sim_bridge.ros.planner_link import DECISION_PERIOD_NS, EPISODE_GAP_NS
 from sim_bridge.ros.publishing import FramePublisher
 from sim_bridge.simulation import Simulation, StepResult
@@ -27,7 +27,7 @@ class EpisodePlayer:
         """Play the episode of a seed until it ends, after a pause that ends the one before."""
         start_ns = self._now_ns + EPISODE_GAP_NS
         start_ns = -(-start_ns // DECISION_PERIOD_NS) * DECISION_PERIOD_NS
-        pass_time(self._pacing, self._now_ns, start_ns)
+        self._pacing.pause(self._now_ns, start_ns)
         simulation.reset([seed])
         self._now_ns = start_ns
         self._publisher.publish_start(simulation, seed, start_ns)

@@ -20,6 +20,7 @@ from sim_bridge.ros.planner_link import DECISION_PERIOD_NS, PlannerLink
 OLDEST_DECISION_S = 1.0
 # Nodes read /clock best effort: a lost time is sent again while an answer to it is awaited.
 _CLOCK_AGAIN_S = 0.1
+_PAUSE_STEP_NS = SECOND_NS // 10
 
 
 class WallPace:
@@ -51,8 +52,8 @@ class Pacing(Protocol):
     def decision(self, stamp_ns: int) -> Decision | None:
         """Return the decision to obey from this time on, None if there is no valid one."""
 
-    def skip_to(self, stamp_ns: int) -> None:
-        """Let simulated time pass without inputs."""
+    def pause(self, from_ns: int, until_ns: int) -> None:
+        """Let the simulated time between two frames pass without inputs."""
 
     def close(self) -> None:
         """Stop waiting."""
@@ -90,10 +91,12 @@ class LockStep:
             self._held = None if late else found
         return self._held
 
-    def skip_to(self, stamp_ns: int) -> None:
-        """Jump to the time; the policy's decision then (there is no input) is awaited."""
-        self._link.tick(stamp_ns)
-        self._await_decision(stamp_ns)
+    def pause(self, from_ns: int, until_ns: int) -> None:
+        """Jump to the last time at which a decision is due, and await it (it is Stop)."""
+        last_ns = (until_ns - 1) // DECISION_PERIOD_NS * DECISION_PERIOD_NS
+        if last_ns > from_ns:
+            self._link.tick(last_ns)
+            self._await_decision(last_ns)
 
     def close(self) -> None:
         """Stop waiting."""
@@ -129,17 +132,11 @@ class RealTime:
             return None
         return decision
 
-    def skip_to(self, stamp_ns: int) -> None:
-        """Let time pass."""
-        self.reach(stamp_ns)
+    def pause(self, from_ns: int, until_ns: int) -> None:
+        """Let time pass at its pace."""
+        for stamp_ns in range(from_ns + _PAUSE_STEP_NS, until_ns, _PAUSE_STEP_NS):
+            self.reach(stamp_ns)
 
     def close(self) -> None:
         """Stop waiting."""
         self._link.close()
-
-
-def pass_time(pacing: Pacing, from_ns: int, until_ns: int) -> None:
-    """Let the time between two frames pass, each decision between them awaited in its turn."""
-    first_ns = (from_ns // DECISION_PERIOD_NS + 1) * DECISION_PERIOD_NS
-    for stamp_ns in range(first_ns, until_ns, DECISION_PERIOD_NS):
-        pacing.skip_to(stamp_ns)

@@ -15,9 +15,8 @@ from risk_dqn_planner.ros.conversions import SECOND_NS, to_ns, to_stamp
 from risk_dqn_planner.ros.qos import NEWEST
 
 DECISION_PERIOD_NS = SECOND_NS // 2
-# Between episodes this much time passes without inputs: more than the policy's longest gap in a
-# history, so that the planner forgets the last episode.
-EPISODE_GAP_NS = SECOND_NS
+# Between episodes this much time passes without inputs, so that the planner forgets the last one.
+EPISODE_GAP_NS = 2 * SECOND_NS
 # The first episode starts at a multiple of this, however long the planner took to come up.
 _START_NS = 10 * SECOND_NS
 _FIRST_ANSWER_S = 1.0

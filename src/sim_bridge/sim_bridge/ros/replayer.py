@@ -15,7 +15,7 @@ from rclpy.serialization import deserialize_message
 from risk_dqn_planner.errors import BagError, ConfigurationError
 from sim_bridge.ros.comparison import Difference, difference
 from sim_bridge.ros.node_group import NodeGroup
-from sim_bridge.ros.pacing import LockStep, WallPace, pass_time
+from sim_bridge.ros.pacing import LockStep, WallPace
 from sim_bridge.ros.planner_link import EPISODE_GAP_NS, PlannerLink
 from sim_bridge.ros.process import ParameterValue
 from sim_bridge.ros.recording import Stored, read_bag
@@ -97,7 +97,7 @@ class Replayer:
             self._send(frame, routes=True)
             # After the warm-up there is a pause too, as there was before the recording.
             gap_from_ns = frame.stamp_ns - EPISODE_GAP_NS if before_ns is None else before_ns
-            pass_time(self._pacing, gap_from_ns, frame.stamp_ns)
+            self._pacing.pause(gap_from_ns, frame.stamp_ns)
             self._send(frame, routes=False)
             self._pacing.reach(frame.stamp_ns)
             if frame.decision is not None:

@@ -130,3 +130,20 @@ def test_simulated_time_runs_at_most_at_the_given_factor(factor: float, least_s:
         pace.reach(stamp_ns)
     elapsed_s = time.monotonic() - started
     assert least_s <= elapsed_s < least_s + 1.0
+
+
+def test_in_lock_step_a_pause_jumps_to_the_last_decision_before_the_next_frame() -> None:
+    link = FakeLink()
+    times = [n * DECISION_PERIOD_NS for n in range(5)]
+    link.answers = {times[3]: [decision(times[3], 0)]}
+    pacing = LockStep(link, WallPace(0.0), LONG_S)
+    pacing.pause(times[0], times[4])
+    assert link.log == [f"clock {times[3]} with situation -1"]
+    pacing.pause(times[4], times[4] + 1)  # nothing is due in between
+    assert len(link.log) == 1
+
+
+def test_in_real_time_a_pause_lets_the_clock_go_on() -> None:
+    link = FakeLink()
+    RealTime(link, WallPace(0.0)).pause(0, 400_000_000)
+    assert [entry.split()[1] for entry in link.log] == ["100000000", "200000000", "300000000"]

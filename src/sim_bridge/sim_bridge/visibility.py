@@ -36,33 +36,41 @@ def cast_shadow(
     is at (x, y). A half-plane (nx, ny, c) holds the points with nx px + ny py > c. A sensor
     inside the rectangle sees nothing: four times all.
     """
-    faces = 0
-    first, last = -1, -1
-    # Walk over the edges so that those facing the sensor come out as one chain.
-    for edge in range(4):
-        ax, ay = catalogue[side, k, edge, 0], catalogue[side, k, edge, 1]
-        bx, by = catalogue[side, k, (edge + 1) % 4, 0], catalogue[side, k, (edge + 1) % 4, 1]
-        nx, ny, offset = _left_of(ax, ay, bx, by)
-        if nx * x + ny * y < offset:
-            # The other row is kept equal until there is a second facing edge.
-            for row in range(faces, 2):
-                shadows[b, o, row, 0], shadows[b, o, row, 1] = nx, ny
-                shadows[b, o, row, 2] = offset
-            faces += 1
-            if first < 0 or (last + 1) % 4 != edge:
-                first = edge
-            if last < 0 or (last + 1) % 4 == edge:
-                last = edge
-    if faces == 0:
+    # With its first corner as origin and the edges from there as units of u and v (to its second
+    # and to its last corner) the rectangle is 0 <= u, v <= 1.
+    ox, oy = catalogue[side, k, 0, 0], catalogue[side, k, 0, 1]
+    ux, uy = catalogue[side, k, 1, 0] - ox, catalogue[side, k, 1, 1] - oy
+    vx, vy = catalogue[side, k, 3, 0] - ox, catalogue[side, k, 3, 1] - oy
+    uu, vv = ux * ux + uy * uy, vx * vx + vy * vy
+    along_u, along_v = (x - ox) * ux + (y - oy) * uy, (x - ox) * vx + (y - oy) * vy
+    # Beyond which side of the rectangle the sensor is, -1, 0 or 1; written without branches, which
+    # a processor could not foresee.
+    beyond_u = (1.0 if along_u > uu else 0.0) - (1.0 if along_u < 0.0 else 0.0)
+    beyond_v = (1.0 if along_v > vv else 0.0) - (1.0 if along_v < 0.0 else 0.0)
+    # Behind the edges that face the sensor; where only one does, twice behind that.
+    behind_u = -(ox * ux + oy * uy + uu) if beyond_u > 0.0 else ox * ux + oy * uy
+    behind_v = -(ox * vx + oy * vy + vv) if beyond_v > 0.0 else ox * vx + oy * vy
+    only_u, only_v = beyond_v == 0.0, beyond_u == 0.0
+    shadows[b, o, 0, 0] = -beyond_v * vx if only_v else -beyond_u * ux
+    shadows[b, o, 0, 1] = -beyond_v * vy if only_v else -beyond_u * uy
+    shadows[b, o, 0, 2] = behind_v if only_v else behind_u
+    shadows[b, o, 1, 0] = -beyond_u * ux if only_u else -beyond_v * vx
+    shadows[b, o, 1, 1] = -beyond_u * uy if only_u else -beyond_v * vy
+    shadows[b, o, 1, 2] = behind_u if only_u else behind_v
+    # The facing edges run counter-clockwise from a first to a last corner, where the tangents are.
+    first_u = 1.0 if beyond_v > 0.0 or (only_u and beyond_u > 0.0) else 0.0
+    first_v = 1.0 if beyond_u < 0.0 or (only_v and beyond_v > 0.0) else 0.0
+    last_u = 1.0 if beyond_v < 0.0 or (only_u and beyond_u > 0.0) else 0.0
+    last_v = 1.0 if beyond_u > 0.0 or (only_v and beyond_v > 0.0) else 0.0
+    first = ox + first_u * ux + first_v * vx, oy + first_u * uy + first_v * vy
+    last = ox + last_u * ux + last_v * vx, oy + last_u * uy + last_v * vy
+    plane = _left_of(first[0], first[1], x, y)
+    shadows[b, o, 2, 0], shadows[b, o, 2, 1], shadows[b, o, 2, 2] = plane
+    plane = _left_of(x, y, last[0], last[1])
+    shadows[b, o, 3, 0], shadows[b, o, 3, 1], shadows[b, o, 3, 2] = plane
+    if only_u and only_v:
         for row in range(HALF_PLANES):
             shadows[b, o, row, 0], shadows[b, o, row, 1], shadows[b, o, row, 2] = 0.0, 0.0, -1.0
-        return
-    # The chain runs counter-clockwise around the rectangle, clockwise as seen from the sensor.
-    end = (last + 1) % 4
-    tangent = _left_of(catalogue[side, k, first, 0], catalogue[side, k, first, 1], x, y)
-    shadows[b, o, 2, 0], shadows[b, o, 2, 1], shadows[b, o, 2, 2] = tangent
-    tangent = _left_of(x, y, catalogue[side, k, end, 0], catalogue[side, k, end, 1])
-    shadows[b, o, 3, 0], shadows[b, o, 3, 1], shadows[b, o, 3, 2] = tangent
 
 
 @kernel

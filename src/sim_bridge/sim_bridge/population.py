@@ -135,10 +135,50 @@ def entry_in_sight(
 
 
 @kernel
-def come_and_go(
+def replace_those_gone(
+    paths: Paths, lanes: Lanes, draws: Draws, episodes: Episodes, vehicles: Vehicles
+) -> None:
+    """Where a decision is due, empty the places of vehicles that have left their path.
+
+    With respawning traffic a new vehicle, with a new id, waits for each.
+    """
+    running, phase, seed, next_id = (
+        episodes.running,
+        episodes.phase,
+        episodes.seed,
+        episodes.next_id,
+    )
+    driving, waiting, path, s_m = vehicles.driving, vehicles.waiting, vehicles.path, vehicles.s_m
+    ids, yields, follows_ego = vehicles.id, vehicles.yields, vehicles.follows_ego
+    desired_mps, leader, leader_due = (
+        vehicles.desired_speed_mps,
+        vehicles.leader,
+        vehicles.leader_due,
+    )
+    length_m, limit_mps = paths.length_m, paths.limit_mps
+    first_entry, entry_path = lanes.first_entry, lanes.entry_path
+    batch, count = driving.shape
+    for b in range(batch):
+        if not running[b] or phase[b] != 0:
+            continue
+        for i in range(count):
+            if not driving[b, i] or s_m[b, i] <= length_m[path[b, i]]:
+                continue
+            driving[b, i], waiting[b, i] = False, draws.respawn
+            for j in range(count):
+                leader_due[b, j] |= leader[b, j] == i
+            p, desired, yields[b, i] = draw_vehicle(
+                seed[b], next_id[b], draws, first_entry, entry_path
+            )
+            path[b, i], desired_mps[b, i] = p, min(desired, limit_mps[p])
+            ids[b, i], follows_ego[b, i] = next_id[b], False
+            next_id[b] += 1
+
+
+@kernel
+def let_one_in(
     ego: EgoLane,
     paths: Paths,
-    lanes: Lanes,
     sharing: Sharing,
     corners: Floats,
     settings: Settings,
@@ -146,67 +186,71 @@ def come_and_go(
     vehicles: Vehicles,
     shadows: Floats,
 ) -> None:
-    """Where a decision is due, replace vehicles that have left and let waiting ones in.
+    """Where a decision is due, let one of the waiting vehicles in if there is room, in turn.
 
     Nobody appears out of nothing: an entry within the sensor's range must be out of sight.
-    Notes whether leaders have to be found anew. corners (2, K, 4, 2): the obstacles' catalogue;
-    shadows (B, O, 4, 3): memory to work in.
+    corners (2, K, 4, 2): the obstacles' catalogue; shadows (B, O, 4, 3): memory to work in.
     """
+    running, phase, tick = episodes.running, episodes.phase, episodes.tick
     driving, waiting, path, s_m = vehicles.driving, vehicles.waiting, vehicles.path, vehicles.s_m
-    speed_mps, desired_mps = vehicles.speed_mps, vehicles.desired_speed_mps
-    ids, yields, follows_ego = vehicles.id, vehicles.yields, vehicles.follows_ego
-    running, phase, leaders_due = episodes.running, episodes.phase, episodes.leaders_due
-    seed, next_id = episodes.seed, episodes.next_id
-    length_m, limit_mps, entry_is_far = paths.length_m, paths.limit_mps, paths.entry_is_far
-    first_entry, entry_path = lanes.first_entry, lanes.entry_path
-    change_low_m, change_high_m = sharing.change_low_m, sharing.change_high_m
-    draws, gap_m = settings.draws, settings.idm.standstill_gap_m
-    batch, count = driving.shape
-    for b in range(batch):
+    speed_mps, desired_mps, due = (
+        vehicles.speed_mps,
+        vehicles.desired_speed_mps,
+        vehicles.leader_due,
+    )
+    low_m, high_m, offset_m, touches = (
+        sharing.low_m,
+        sharing.high_m,
+        sharing.offset_m,
+        sharing.touches,
+    )
+    table, entry_is_far = paths.table, paths.entry_is_far
+    length_m, width_m = paths.vehicle_length_m, paths.vehicle_width_m
+    gap_m, headway_s = settings.idm.standstill_gap_m, settings.draws.headway_s
+    for b in range(len(running)):
         if not running[b] or phase[b] != 0:
             continue
-        for i in range(count):
-            p, s = path[b, i], s_m[b, i]
-            leaders_due[b] |= (s >= change_low_m[p]) & (s <= change_high_m[p])
-            if driving[b, i] and s > length_m[p]:
-                driving[b, i] = False
-                waiting[b, i] = draws.respawn
-                leaders_due[b] = True
-                p, desired, yields[b, i] = draw_vehicle(
-                    seed[b], next_id[b], draws, first_entry, entry_path
-                )
-                path[b, i], desired_mps[b, i] = p, min(desired, limit_mps[p])
-                ids[b, i], follows_ego[b, i] = next_id[b], False
-                next_id[b] += 1
-            if not waiting[b, i]:
-                continue
-            if not entry_is_far[p] and entry_in_sight(
-                ego, paths, corners, settings, episodes, b, p, shadows
-            ):
-                continue
-            if has_room(
-                b,
-                i,
-                p,
-                0.0,
-                desired_mps[b, i],
-                gap_m,
-                draws.headway_s,
-                driving,
-                path,
-                s_m,
-                speed_mps,
-                paths.table,
-                paths.vehicle_length_m,
-                paths.vehicle_width_m,
-                sharing.low_m,
-                sharing.high_m,
-                sharing.offset_m,
-                sharing.touches,
-            ):
-                driving[b, i], waiting[b, i] = True, False
-                s_m[b, i], speed_mps[b, i] = 0.0, desired_mps[b, i]
-                leaders_due[b] = True
+        chosen = first_waiting(waiting, b, tick[b] // settings.decision_steps)
+        if chosen == NOBODY:
+            continue
+        p, desired = path[b, chosen], desired_mps[b, chosen]
+        if not entry_is_far[p] and entry_in_sight(
+            ego, paths, corners, settings, episodes, b, p, shadows
+        ):
+            continue
+        if has_room(
+            b,
+            chosen,
+            p,
+            0.0,
+            desired,
+            gap_m,
+            headway_s,
+            driving,
+            path,
+            s_m,
+            speed_mps,
+            table,
+            length_m,
+            width_m,
+            low_m,
+            high_m,
+            offset_m,
+            touches,
+        ):
+            driving[b, chosen], waiting[b, chosen], due[b, chosen] = True, False, True
+            s_m[b, chosen], speed_mps[b, chosen] = 0.0, desired
+
+
+@kernel
+def first_waiting(waiting: Booleans, b: int, turn: int) -> int:
+    """Return the first place of episode b that waits, beginning with whose turn it is; -1 none."""
+    begin = turn % max(waiting.shape[1], 1)
+    found = NOBODY
+    for i in range(waiting.shape[1]):
+        if waiting[b, i] and (found == NOBODY or found < begin <= i):
+            found = i
+    return found
 
 
 @kernel
@@ -254,6 +298,7 @@ def start_traffic(
     )
     seeds, next_id = episodes.seed, episodes.next_id
     ids, yields, follows_ego = vehicles.id, vehicles.yields, vehicles.follows_ego
+    leader_due = vehicles.leader_due
     first_entry, entry_path = lanes.first_entry, lanes.entry_path
     table, zone_m, limit_mps = paths.table, paths.zone_m, paths.limit_mps
     length_m, width_m = paths.vehicle_length_m, paths.vehicle_width_m
@@ -267,8 +312,7 @@ def start_traffic(
         count = fewest + random_index(seed, COUNT_STREAM, _PLACE, most - fewest + 1)
         next_id[b] = count + 1
         for i in range(driving.shape[1]):
-            driving[b, i] = False
-            waiting[b, i] = i < count
+            driving[b, i], waiting[b, i], leader_due[b, i] = False, i < count, True
         for i in range(count):
             p, desired, yields[b, i] = draw_vehicle(seed, i + 1, draws, first_entry, entry_path)
             ids[b, i], follows_ego[b, i], path[b, i] = i + 1, False, p
@@ -328,7 +372,6 @@ def start_episodes(
         episodes.reached_goal[b] = False
         episodes.collided[b] = False
         episodes.timed_out[b] = False
-        episodes.leaders_due[b] = True
         for o in range(episodes.obstacle.shape[1]):
             count = obstacle_count[o % 2]
             chosen = random_index(seeds[b], OBSTACLE_STREAM, o, max(count, 1))

@@ -21,18 +21,21 @@ _EFFORT = 1.5
 # A vehicle that waits, or is slow, is taken to come at this speed.
 _SETTING_OFF_MPS = 3.0
 # Places to cross that are further ahead are decided later.
-_AHEAD_S = 6.0
+_AHEAD_S = 4.0
 _MARGIN_S = 0.5
 
 
 class Crossings(NamedTuple):
     """Where path p crosses path q, row p and column q of (P, P): from enter_m to exit_m on p.
 
-    Infinity where it does not. exist: whether any do.
+    Infinity where it does not. begin_m, end_m (P,): all of these of a path lie between. exist:
+    whether there are any.
     """
 
     enter_m: Floats
     exit_m: Floats
+    begin_m: Floats
+    end_m: Floats
     exist: bool
 
 
@@ -46,7 +49,14 @@ def crossings(tables: Floats, shared: Booleans, vehicle: VehicleDimensions) -> C
                 (enter_m[p, q], exit_m[p, q]), _ = contact_intervals(
                     tables[p], tables[q : q + 1], vehicle, vehicle
                 )
-    return Crossings(enter_m, exit_m, bool((enter_m < np.inf).any()))
+    there = enter_m < np.inf
+    return Crossings(
+        enter_m=enter_m,
+        exit_m=exit_m,
+        begin_m=enter_m.min(axis=1),
+        end_m=np.where(there, exit_m, -np.inf).max(axis=1),
+        exist=bool(there.any()),
+    )
 
 
 @kernel
@@ -78,26 +88,61 @@ def give_way(crossings: Crossings, idm: Idm, episodes: Episodes, vehicles: Vehic
         vehicles.hold_m,
     )
     enter_m, exit_m = crossings.enter_m, crossings.exit_m
+    begin_m, end_m = crossings.begin_m, crossings.end_m
     batch, count = driving.shape
+    # Those in or shortly before any crossing.
+    near = np.empty(count, dtype=np.int64)
     for b in range(batch):
         if not running[b] or phase[b] != 0:
             continue
+        used = 0
         for i in range(count):
-            p, v = path[b, i], speed_mps[b, i]
             hold_m[b, i] = math.inf
-            for j in range(count):
-                q, u = path[b, j], speed_mps[b, j]
-                way_m = enter_m[p, q] - s_m[b, i]
-                left_m = exit_m[q, p] - s_m[b, j]
-                arrival_s = way_m / max(v, _SETTING_OFF_MPS)
-                near = (way_m > 0.0) & (arrival_s < _AHEAD_S) & (left_m > 0.0)
-                if not (near & driving[b, i] & driving[b, j]):
+            p = path[b, i]
+            ahead_m = _AHEAD_S * max(speed_mps[b, i], _SETTING_OFF_MPS)
+            if driving[b, i] and begin_m[p] - ahead_m < s_m[b, i] < end_m[p]:
+                near[used] = i
+                used += 1
+        for i in near[:used]:
+            for j in near[:used]:
+                p, q = path[b, i], path[b, j]
+                if s_m[b, i] >= enter_m[p, q] or s_m[b, j] >= exit_m[q, p]:
                     continue
-                other_way_m = enter_m[q, p] - s_m[b, j]
-                if other_way_m > 0.0:
-                    gone_s = left_m / max(u, _SETTING_OFF_MPS) + _MARGIN_S
-                    first = goes_first(way_m, v, other_way_m, u, idm)
-                    tie = (not first) & (not goes_first(other_way_m, u, way_m, v, idm)) & (i < j)
-                    if first or tie or gone_s < arrival_s:
-                        continue
-                hold_m[b, i] = min(hold_m[b, i], enter_m[p, q])
+                if waits(
+                    i,
+                    enter_m[p, q] - s_m[b, i],
+                    speed_mps[b, i],
+                    j,
+                    enter_m[q, p] - s_m[b, j],
+                    exit_m[q, p] - s_m[b, j],
+                    speed_mps[b, j],
+                    idm,
+                ):
+                    hold_m[b, i] = min(hold_m[b, i], enter_m[p, q])
+
+
+@kernel
+def waits(
+    i: int,
+    way_m: float,
+    mps: float,
+    j: int,
+    other_way_m: float,
+    other_left_m: float,
+    other_mps: float,
+    idm: Idm,
+) -> bool:
+    """Tell whether vehicle i waits before a crossing for vehicle j, which has not left it yet.
+
+    way_m: to the crossing; other_left_m: until the other one has left it.
+    """
+    if other_way_m <= 0.0:
+        return True
+    if other_way_m == math.inf:
+        return False
+    gone_s = other_left_m / max(other_mps, _SETTING_OFF_MPS) + _MARGIN_S
+    if gone_s < way_m / max(mps, _SETTING_OFF_MPS):
+        return False
+    if goes_first(way_m, mps, other_way_m, other_mps, idm):
+        return False
+    return goes_first(other_way_m, other_mps, way_m, mps, idm) or j < i

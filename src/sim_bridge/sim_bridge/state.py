@@ -21,7 +21,7 @@ class Episodes(NamedTuple):
     ego_s_m (B,): along the ego's path; ego_step_m (B,): moved in the last inner step;
     ego_speed_mps (B,).
     obstacle (B, O): index into the catalogue of the left (even places) or the right side, -1 none.
-    next_id (B,): id of the next vehicle. leaders_due (B,): who follows whom may have changed.
+    next_id (B,): id of the next vehicle.
     """
 
     seed: NDArray[np.uint64]
@@ -36,7 +36,6 @@ class Episodes(NamedTuple):
     ego_speed_mps: Floats
     obstacle: Integers
     next_id: Integers
-    leaders_due: Booleans
 
 
 class Vehicles(NamedTuple):
@@ -46,9 +45,9 @@ class Vehicles(NamedTuple):
     room; else the place is empty. id: unique in an episode; path: index into P paths; s_m: along
     the path; acceleration_mps2: of the last inner step; yields: lets the ego go first;
     follows_ego: has taken the ego for its leader. leader: place of the vehicle ahead, -1 none;
-    leader_offset_m: what to add to the leader's s to have it on the own path. Drivers look for
-    their leader once per decision period. hold_m: arc length before which to wait for
-    others to cross, infinity for going on.
+    leader_offset_m: what to add to the leader's s to have it on the own path; leader_due: it may
+    be another one now. Drivers look for their leader once per decision period at most.
+    hold_m: arc length before which to wait for others to cross, infinity for going on.
     """
 
     driving: Booleans
@@ -63,6 +62,7 @@ class Vehicles(NamedTuple):
     follows_ego: Booleans
     leader: Integers
     leader_offset_m: Floats
+    leader_due: Booleans
     hold_m: Floats
 
 
@@ -118,7 +118,6 @@ def empty_state(batch: int, vehicles: int, obstacles: int, lanes: int) -> Simula
         ego_speed_mps=np.zeros(batch),
         obstacle=np.full((batch, obstacles), NOBODY, dtype=np.int64),
         next_id=integers(1),
-        leaders_due=booleans(),
     )
     counts = Counts(
         start_s_m=np.zeros(batch),
@@ -148,5 +147,6 @@ def _empty_vehicles(batch: int, vehicles: int) -> Vehicles:
         follows_ego=np.zeros(shape, dtype=np.bool_),
         leader=np.full(shape, NOBODY, dtype=np.int64),
         leader_offset_m=np.zeros(shape),
+        leader_due=np.zeros(shape, dtype=np.bool_),
         hold_m=np.full(shape, np.inf),
     )

@@ -11,7 +11,7 @@ from risk_dqn_planner.geometry.footprint import footprints_overlap
 from risk_dqn_planner.situation.situations import Floats, Integers
 from sim_bridge.dynamics import accelerate, follow_target, target_speed
 from sim_bridge.path_geometry import table_pose
-from sim_bridge.population import come_and_go
+from sim_bridge.population import let_one_in, replace_those_gone
 from sim_bridge.right_of_way import Crossings, give_way
 from sim_bridge.settings import Settings
 from sim_bridge.sharing import EgoSharing, Sharing
@@ -53,7 +53,8 @@ def advance(
     idm, first_zone_m = settings.idm, ego.first_zone_m
     lengths_m = 0.5 * (ego.length_m + paths.vehicle_length_m)
     for _ in range(steps):
-        come_and_go(ego, paths, lanes, sharing, corners, settings, episodes, vehicles, shadows)
+        replace_those_gone(paths, lanes, settings.draws, episodes, vehicles)
+        let_one_in(ego, paths, sharing, corners, settings, episodes, vehicles, shadows)
         find_leaders(sharing, episodes, vehicles)
         if crossings.exist:
             give_way(crossings, idm, episodes, vehicles)

@@ -70,19 +70,29 @@ def yields_now(
 
 @kernel
 def find_leaders(sharing: Sharing, episodes: Episodes, vehicles: Vehicles) -> None:
-    """Find each vehicle's nearest one ahead on its path, where `leaders_due` asks for it."""
-    running, leaders_due = episodes.running, episodes.leaders_due
+    """Where a decision is due, find the nearest vehicle ahead of those whose leader may change.
+
+    Those are the ones marked `leader_due`, and all if anyone is near a fork or a join.
+    """
+    running, phase = episodes.running, episodes.phase
     driving, path, s_m = vehicles.driving, vehicles.path, vehicles.s_m
-    leaders, leader_offset_m = vehicles.leader, vehicles.leader_offset_m
+    leader, leader_offset_m, due = vehicles.leader, vehicles.leader_offset_m, vehicles.leader_due
     low_m, high_m, offset_m = sharing.low_m, sharing.high_m, sharing.offset_m
+    change_low_m, change_high_m = sharing.change_low_m, sharing.change_high_m
     batch, count = driving.shape
     for b in range(batch):
-        if not (running[b] and leaders_due[b]):
+        if not running[b] or phase[b] != 0:
             continue
-        leaders_due[b] = False
+        everyone = False
         for i in range(count):
             p, own = path[b, i], s_m[b, i]
-            nearest, leader = math.inf, NOBODY
+            everyone |= driving[b, i] & (own >= change_low_m[p]) & (own <= change_high_m[p])
+        for i in range(count):
+            if not (everyone or due[b, i]):
+                continue
+            due[b, i] = False
+            p, own = path[b, i], s_m[b, i]
+            nearest, found = math.inf, NOBODY
             for j in range(count):
                 q, s = path[b, j], s_m[b, j]
                 ahead = s + offset_m[p, q] - own
@@ -91,10 +101,10 @@ def find_leaders(sharing: Sharing, episodes: Episodes, vehicles: Vehicles) -> No
                 before = (ahead > 0.0) | ((ahead == 0.0) & (j < i))
                 on_path = (s >= low_m[p, q]) & (s <= high_m[p, q])
                 if driving[b, j] & on_path & before & (ahead < nearest):
-                    nearest, leader = ahead, j
-            leaders[b, i] = leader
-            if leader != NOBODY:
-                leader_offset_m[b, i] = offset_m[p, path[b, leader]]
+                    nearest, found = ahead, j
+            leader[b, i] = found
+            if found != NOBODY:
+                leader_offset_m[b, i] = offset_m[p, path[b, found]]
 
 
 @kernel

@@ -14,7 +14,7 @@ from risk_dqn_planner.map.loader import load_map
 from risk_dqn_planner.situation.situations import Floats
 from sim_bridge.maps import shipped_map
 from sim_bridge.path_geometry import cut
-from sim_bridge.population import come_and_go, has_room
+from sim_bridge.population import first_waiting, has_room, let_one_in, replace_those_gone
 from sim_bridge.scenario import Scenario
 from sim_bridge.scenario_fields import EgoStart, Interval, Obstacles, Sensor
 from sim_bridge.simulation import Simulation
@@ -23,7 +23,9 @@ from sim_bridge.traffic import find_leaders
 from sim_bridge.world import World
 
 WithVehicles = Callable[..., Scenario]
-STOP, FAST = 0, 2
+STOP = 0
+# Put on leaders that nobody should look for again.
+MARK = 1000
 
 
 def started(model: IntersectionModel, scenario: Scenario, batch: int = 200) -> Simulation:
@@ -297,12 +299,12 @@ def test_leaders_found_only_when_due_are_those_found_every_time(
     model = build_intersection(load_map(place.path, place.origin), place.route)
     simulation = started(model, with_vehicles(base, 8, headway_s=0.5), batch=20)
     world, (episodes, vehicles, _) = simulation.world, simulation.state
-    followers = spared = 0
+    followers = searches_spared = 0
     for _ in range(100):
-        come_and_go(
+        replace_those_gone(world.paths, world.lanes, simulation.settings.draws, episodes, vehicles)
+        let_one_in(
             world.ego,
             world.paths,
-            world.lanes,
             world.sharing,
             world.obstacles.corners,
             simulation.settings,
@@ -310,18 +312,35 @@ def test_leaders_found_only_when_due_are_those_found_every_time(
             vehicles,
             np.zeros((20, 2, 4, 3)),
         )
-        spared += int((~episodes.leaders_due).sum())
         every_time = copy.deepcopy(vehicles)
-        find_leaders(
-            world.sharing, episodes._replace(leaders_due=np.ones(20, dtype=np.bool_)), every_time
-        )
+        every_time.leader_due[:] = True
+        find_leaders(world.sharing, episodes, every_time)
+        vehicles.leader[vehicles.driving & ~vehicles.leader_due] += MARK
         find_leaders(world.sharing, episodes, vehicles)
+        spared = vehicles.driving & (vehicles.leader > MARK // 2)
+        vehicles.leader[spared] -= MARK
         driving = vehicles.driving
         assert np.array_equal(vehicles.leader[driving], every_time.leader[driving])
         followed = (vehicles.leader >= 0) & driving
         offsets = (vehicles.leader_offset_m, every_time.leader_offset_m)
         assert np.array_equal(*(offset[followed] for offset in offsets))
         followers += int(followed.sum())
+        searches_spared += int(spared.sum())
         simulation.step(np.full(20, STOP))
     assert followers > 1000
-    assert spared > 200
+    assert searches_spared > 1000
+
+
+@pytest.mark.parametrize(
+    ("waiting", "turn", "chosen"),
+    [
+        ([0, 0, 0, 0], 1, -1),
+        ([1, 0, 1, 0], 0, 0),
+        ([1, 0, 1, 0], 1, 2),
+        ([1, 0, 1, 0], 3, 0),
+        ([1, 0, 1, 0], 6, 2),
+        ([0, 0, 1, 1], 3, 3),
+    ],
+)
+def test_waiting_vehicles_come_in_by_turns(waiting: list[int], turn: int, chosen: int):
+    assert first_waiting(np.array([waiting], dtype=np.bool_), 0, turn) == chosen

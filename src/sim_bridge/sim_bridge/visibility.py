@@ -58,10 +58,10 @@ def cast_shadow(
     shadows[b, o, 1, 1] = -beyond_u * uy if only_u else -beyond_v * vy
     shadows[b, o, 1, 2] = behind_u if only_u else behind_v
     # The facing edges run counter-clockwise from a first to a last corner, where the tangents are.
-    first_u = 1.0 if beyond_v > 0.0 or (only_u and beyond_u > 0.0) else 0.0
-    first_v = 1.0 if beyond_u < 0.0 or (only_v and beyond_v > 0.0) else 0.0
-    last_u = 1.0 if beyond_v < 0.0 or (only_u and beyond_u > 0.0) else 0.0
-    last_v = 1.0 if beyond_u > 0.0 or (only_v and beyond_v > 0.0) else 0.0
+    first_u = 1.0 if (beyond_v > 0.0) | (only_u & (beyond_u > 0.0)) else 0.0
+    first_v = 1.0 if (beyond_u < 0.0) | (only_v & (beyond_v > 0.0)) else 0.0
+    last_u = 1.0 if (beyond_v < 0.0) | (only_u & (beyond_u > 0.0)) else 0.0
+    last_v = 1.0 if (beyond_u > 0.0) | (only_v & (beyond_v > 0.0)) else 0.0
     first = ox + first_u * ux + first_v * vx, oy + first_u * uy + first_v * vy
     last = ox + last_u * ux + last_v * vx, oy + last_u * uy + last_v * vy
     plane = _left_of(first[0], first[1], x, y)
@@ -96,6 +96,19 @@ def cast_shadows(
 
 
 @kernel
+def _sides(
+    shadows: Floats, b: int, o: int, x: float, y: float
+) -> tuple[float, float, float, float]:
+    """Return how far inside of each half-plane of a shadow a point is, in lengths of the normal."""
+    return (
+        shadows[b, o, 0, 0] * x + shadows[b, o, 0, 1] * y - shadows[b, o, 0, 2],
+        shadows[b, o, 1, 0] * x + shadows[b, o, 1, 1] * y - shadows[b, o, 1, 2],
+        shadows[b, o, 2, 0] * x + shadows[b, o, 2, 1] * y - shadows[b, o, 2, 2],
+        shadows[b, o, 3, 0] * x + shadows[b, o, 3, 1] * y - shadows[b, o, 3, 2],
+    )
+
+
+@kernel
 def point_hidden(
     x: float,
     y: float,
@@ -111,16 +124,12 @@ def point_hidden(
     The edge of a shadow is still visible.
     """
     dx, dy = x - sensor_x, y - sensor_y
-    if dx * dx + dy * dy > range_m * range_m:
-        return True
+    hidden = dx * dx + dy * dy > range_m * range_m
     for o in range(count):
-        inside = True
-        for row in range(HALF_PLANES):
-            along = shadows[b, o, row, 0] * x + shadows[b, o, row, 1] * y
-            inside = inside and along > shadows[b, o, row, 2]
-        if inside:
-            return True
-    return False
+        inside = _sides(shadows, b, o, x, y)
+        # Without branches, which a processor could not foresee.
+        hidden |= (inside[0] > 0.0) & (inside[1] > 0.0) & (inside[2] > 0.0) & (inside[3] > 0.0)
+    return hidden
 
 
 @kernel
@@ -133,19 +142,6 @@ def range_exit(ax: float, ay: float, dx: float, dy: float, range_m: float) -> fl
     half = ax * dx + ay * dy
     start = ax * ax + ay * ay - range_m * range_m
     return (math.sqrt(half * half - square * start) - half) / square
-
-
-@kernel
-def _sides(
-    shadows: Floats, b: int, o: int, x: float, y: float
-) -> tuple[float, float, float, float]:
-    """Return how far inside of each half-plane of a shadow a point is, in lengths of the normal."""
-    return (
-        shadows[b, o, 0, 0] * x + shadows[b, o, 0, 1] * y - shadows[b, o, 0, 2],
-        shadows[b, o, 1, 0] * x + shadows[b, o, 1, 1] * y - shadows[b, o, 1, 2],
-        shadows[b, o, 2, 0] * x + shadows[b, o, 2, 1] * y - shadows[b, o, 2, 2],
-        shadows[b, o, 3, 0] * x + shadows[b, o, 3, 1] * y - shadows[b, o, 3, 2],
-    )
 
 
 @kernel

@@ -22,9 +22,9 @@ from risk_dqn_planner.vehicle import EgoLimits
 from sim_bridge.matches import most_lanes_at_once
 from sim_bridge.path_geometry import table_pose
 from sim_bridge.perception import VehiclePoses, empty_view, perceive, reveal
-from sim_bridge.population import start_episodes
 from sim_bridge.scenario_fields import Scenario
 from sim_bridge.settings import settings_of
+from sim_bridge.starting import start_episodes
 from sim_bridge.state import NOBODY, empty_state
 from sim_bridge.stepping import advance
 from sim_bridge.visible_area import visible_polygon

@@ -5,11 +5,25 @@ import math
 from collections.abc import Callable, Collection, Sequence
 from itertools import pairwise
 
-from risk_dqn_planner.errors import DisconnectedRouteError, RouteError
+from risk_dqn_planner.errors import ConfigurationError, DisconnectedRouteError, RouteError
 from risk_dqn_planner.map.loader import Lanelet, RoadMap, lanelet_key
 
 # Directions are taken over this much of a centreline: the first few points may wiggle.
 DIRECTION_BASE_M = 2.0
+
+
+def parse_route(text: str) -> tuple[int, ...]:
+    """Read lanelet ids separated by commas.
+
+    Raises:
+        ConfigurationError: something else is among them.
+    """
+    try:
+        return tuple(int(part) for part in text.split(","))
+    except ValueError as error:
+        raise ConfigurationError(
+            f"route is {text!r}, expected lanelet ids separated by commas such as 1,9,4"
+        ) from error
 
 
 def resolve_route(road_map: RoadMap, route: Sequence[int]) -> list[Lanelet]:

@@ -1,14 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """When a policy may be asked, and what is decided when it may not: plain Python, without ROS 2."""
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 
-from risk_dqn_planner.decision import Action, Decision, Reason
+from risk_dqn_planner.decision import Decision, Reason, fault_decision
 from risk_dqn_planner.policies.base import Decisions, Policy
 from risk_dqn_planner.situation.report import SituationReport, Status
 from risk_dqn_planner.situation.situations import Situations
@@ -145,17 +144,5 @@ class Decider:
         return Choice(decision, report.stamp_ns)
 
     def _stop(self, reason: Reason, text: str, report: SituationReport | None = None) -> Choice:
-        unknown = np.full(len(Action), math.nan)
-        decision = Decision(
-            action=Action.STOP,
-            target_speed_mps=0.0,
-            reason=reason,
-            text=f"STOP: {text}",
-            q_values=unknown,
-            action_risks=unknown.copy(),
-            critical_vehicle_id=None,
-            critical_lane_id=None,
-            policy_name=self._policy.name,
-            policy_hash=self._policy.hash,
-        )
+        decision = fault_decision(reason, text, self._policy.name, self._policy.hash)
         return Choice(decision, None if report is None else report.stamp_ns)

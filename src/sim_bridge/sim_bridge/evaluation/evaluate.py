@@ -26,6 +26,7 @@ from rich.table import Table
 
 from risk_dqn_planner.errors import ConfigurationError, PlannerError
 from risk_dqn_planner.map.loader import MapOrigin
+from risk_dqn_planner.map.route import parse_route
 from sim_bridge.environment.place import Place, load_place
 from sim_bridge.evaluation.campaign import Campaign, has_optimum, versions
 from sim_bridge.evaluation.cells import Cell, cells_of, paper_cells
@@ -74,14 +75,7 @@ def _policies(text: str) -> list[str]:
 
 
 def _place(arguments: argparse.Namespace) -> Place:
-    route = None
-    if arguments.route is not None:
-        try:
-            route = tuple(int(part) for part in arguments.route.split(","))
-        except ValueError as error:
-            raise ConfigurationError(
-                f"route is {arguments.route!r}, expected lanelet ids separated by commas"
-            ) from error
+    route = None if arguments.route is None else parse_route(arguments.route)
     origin = MapOrigin.from_text(arguments.origin) if arguments.origin else None
     return load_place(arguments.map, route, origin)
 

@@ -15,8 +15,9 @@ from typing import Any
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-from risk_dqn_planner.errors import ConfigurationError, PlannerError
+from risk_dqn_planner.errors import PlannerError
 from risk_dqn_planner.map.loader import MapOrigin
+from risk_dqn_planner.map.route import parse_route
 from sim_bridge.environment.place import load_place
 from sim_bridge.environment.rewards import REWARDS
 from sim_bridge.learning.checkpoint import RunFolder
@@ -50,17 +51,6 @@ def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
 def _config(arguments: argparse.Namespace) -> TrainingConfig:
     config = preset_named(arguments.preset)
     return config if arguments.steps is None else dataclasses.replace(config, steps=arguments.steps)
-
-
-def _route(text: str | None) -> tuple[int, ...] | None:
-    if text is None:
-        return None
-    try:
-        return tuple(int(part) for part in text.split(","))
-    except ValueError as error:
-        raise ConfigurationError(
-            f"route is {text!r}, expected lanelet ids separated by commas such as 1,9,4"
-        ) from error
 
 
 class _Logs:
@@ -129,7 +119,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     out = arguments.out or Path("out/training") / f"{name}_seed{arguments.seed}"
     try:
         origin = MapOrigin.from_text(arguments.origin) if arguments.origin else None
-        place = load_place(arguments.map, _route(arguments.route), origin)
+        route = None if arguments.route is None else parse_route(arguments.route)
+        place = load_place(arguments.map, route, origin)
         run = Run(
             _config(arguments), arguments.reward, arguments.seed, arguments.map, arguments.scenario
         )

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from risk_dqn_planner.errors import BagError, ConfigurationError, PlannerError
 from risk_dqn_planner.map.loader import MapOrigin
+from risk_dqn_planner.map.route import parse_route
 from sim_bridge.maps import map_names, shipped_map
 from sim_bridge.ros.process import NodeCommand, ParameterValue
 from sim_bridge.ros.topics import remappings
@@ -90,20 +91,6 @@ class RunSettings:
             "autostart": False,
         }
         return NodeCommand("sim_bridge", "simulator_node", parameters, remappings("simulator"))
-
-
-def parse_route(text: str) -> tuple[int, ...]:
-    """Read lanelet ids separated by commas.
-
-    Raises:
-        ConfigurationError: something else is among them.
-    """
-    try:
-        return tuple(int(part) for part in text.split(","))
-    except ValueError as error:
-        raise ConfigurationError(
-            f"route is {text!r}, expected lanelet ids separated by commas such as 1,9,4"
-        ) from error
 
 
 def add_run_arguments(parser: argparse.ArgumentParser) -> None:

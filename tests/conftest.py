@@ -17,7 +17,7 @@ from sim_bridge.ros.building import SimulationShelf
 from sim_bridge.ros.node_group import NodeGroup
 from sim_bridge.ros.run_settings import RunSettings, own_map_settings
 from sim_bridge.ros.session import ros_session
-from sim_bridge.simulation import Simulation
+from sim_bridge.simulation.simulation import Simulation
 
 
 @pytest.fixture(scope="session")

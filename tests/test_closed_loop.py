@@ -19,7 +19,7 @@ from risk_dqn_planner.ros.conversions import to_ns
 from sim_bridge.ros import topics
 from sim_bridge.ros.recording import Bag, Stored, read_bag
 from sim_bridge.ros.run_settings import RunSettings
-from sim_bridge.simulation import Simulation
+from sim_bridge.simulation.simulation import Simulation
 
 pytestmark = pytest.mark.ros
 

@@ -24,8 +24,8 @@ from risk_dqn_planner.risk.risk import RiskConfig, assess
 from risk_dqn_planner.state.history import StateEncoder
 from sim_bridge.environment.place import Place, load_place
 from sim_bridge.maps import map_names
-from sim_bridge.scenario import load_scenario
-from sim_bridge.scenario_fields import Interval
+from sim_bridge.scenarios.fields import Interval
+from sim_bridge.scenarios.loading import load_scenario
 
 PARTS = ("step", "situations", "risk", "encoding", "reset")
 ROUNDS, STEPS = 10, 60

@@ -18,8 +18,8 @@ from risk_dqn_planner.intersection.model import (
     StopLine,
 )
 from risk_dqn_planner.vehicle import VehicleDimensions
-from sim_bridge.scenario import Scenario, load_scenario
-from sim_bridge.scenario_fields import Interval, Obstacles
+from sim_bridge.scenarios.fields import Interval, Obstacles
+from sim_bridge.scenarios.loading import Scenario, load_scenario
 
 # The first example of a test may wait for the compiler.
 settings.register_profile("compiled", deadline=None)

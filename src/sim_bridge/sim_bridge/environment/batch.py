@@ -12,7 +12,7 @@ from risk_dqn_planner.state.history import StateEncoder
 from sim_bridge.environment.interface import EnvironmentStep, Outcome, States
 from sim_bridge.environment.rewards import RewardConfig, rewards
 from sim_bridge.environment.seeds import Seeds, training_seeds
-from sim_bridge.simulation import Simulation, StepResult
+from sim_bridge.simulation.simulation import Simulation, StepResult
 
 
 def outcomes(result: StepResult) -> NDArray[np.int64]:

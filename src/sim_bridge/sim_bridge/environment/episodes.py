@@ -10,7 +10,7 @@ from risk_dqn_planner.policies.base import Policy
 from sim_bridge.environment.batch import outcomes
 from sim_bridge.environment.interface import Outcome
 from sim_bridge.environment.seeds import Seeds
-from sim_bridge.simulation import EpisodeStatistics, Simulation
+from sim_bridge.simulation.simulation import EpisodeStatistics, Simulation
 
 
 class DrivenEpisodes(NamedTuple):

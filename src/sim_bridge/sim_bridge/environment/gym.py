@@ -24,8 +24,8 @@ from sim_bridge.environment.place import load_place
 from sim_bridge.environment.rewards import reward_named
 from sim_bridge.environment.seeds import TRAINING_SEEDS
 from sim_bridge.environment.snapshot import snapshot
-from sim_bridge.render import frame_image
-from sim_bridge.scenario import load_scenario
+from sim_bridge.rendering.render import frame_image
+from sim_bridge.scenarios.loading import load_scenario
 
 
 def _observation_space(environment: BatchEnvironment) -> spaces.Space[NDArray[np.float32]]:

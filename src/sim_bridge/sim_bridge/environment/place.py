@@ -14,8 +14,8 @@ from risk_dqn_planner.intersection.config import IntersectionConfig
 from risk_dqn_planner.intersection.model import IntersectionModel
 from risk_dqn_planner.map.loader import MapOrigin, RoadMap, load_map
 from sim_bridge.maps import shipped_map
-from sim_bridge.scenario import Scenario
-from sim_bridge.simulation import Simulation
+from sim_bridge.scenarios.loading import Scenario
+from sim_bridge.simulation.simulation import Simulation
 
 
 @dataclass(frozen=True)

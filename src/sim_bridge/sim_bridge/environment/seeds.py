@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from risk_dqn_planner.compiled import kernel
 from risk_dqn_planner.errors import ConfigurationError
-from sim_bridge.randomness import random_index
+from sim_bridge.simulation.randomness import random_index
 
 Seeds = NDArray[np.int64]
 

@@ -4,8 +4,8 @@
 import numpy as np
 
 from risk_dqn_planner.policies.base import Action
-from sim_bridge.frames import Frame, VehicleFrame
-from sim_bridge.simulation import Simulation
+from sim_bridge.rendering.frames import Frame, VehicleFrame
+from sim_bridge.simulation.simulation import Simulation
 
 EGO_ID = 0
 

@@ -17,11 +17,11 @@ from risk_dqn_planner.compiled import kernel
 from risk_dqn_planner.decision import Action
 from risk_dqn_planner.geometry.footprint import footprints_overlap
 from risk_dqn_planner.situation.situations import Booleans, Floats, Integers
-from sim_bridge.dynamics import follow_target, target_speed
-from sim_bridge.path_geometry import table_pose
-from sim_bridge.settings import EgoDrive
-from sim_bridge.state import Vehicles
-from sim_bridge.world import EgoLane, Paths
+from sim_bridge.simulation.dynamics import follow_target, target_speed
+from sim_bridge.simulation.settings import EgoDrive
+from sim_bridge.simulation.state import Vehicles
+from sim_bridge.world.path_geometry import table_pose
+from sim_bridge.world.world import EgoLane, Paths
 
 # With the default limits every way of a decision is a whole number of these.
 CELL_M = 1.0 / 336.0

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
-from sim_bridge.scenario import Scenario, load_scenario
+from sim_bridge.scenarios.loading import Scenario, load_scenario
 
 RESPAWNING, FINITE = "respawning", "finite"
 TRAFFIC = (RESPAWNING, FINITE)

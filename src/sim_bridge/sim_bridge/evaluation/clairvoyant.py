@@ -18,8 +18,8 @@ from risk_dqn_planner.situation.situations import Booleans, Integers, Situations
 from sim_bridge.environment.seeds import Seeds
 from sim_bridge.evaluation.bounds import Bounds, Rules, lower_bounds, no_bounds, speeds_from
 from sim_bridge.evaluation.search import GAVE_UP, IMPOSSIBLE, fastest_way
-from sim_bridge.simulation import Simulation
-from sim_bridge.state import Vehicles
+from sim_bridge.simulation.simulation import Simulation
+from sim_bridge.simulation.state import Vehicles
 
 NAME = "clairvoyant"
 

@@ -13,7 +13,7 @@ from sim_bridge.environment.episodes import DrivenEpisodes, drive
 from sim_bridge.environment.seeds import Seeds
 from sim_bridge.evaluation.clairvoyant import NAME as CLAIRVOYANT
 from sim_bridge.evaluation.clairvoyant import ClairvoyantPolicy, optima
-from sim_bridge.simulation import EpisodeStatistics, Simulation
+from sim_bridge.simulation.simulation import EpisodeStatistics, Simulation
 
 
 class Driven(NamedTuple):

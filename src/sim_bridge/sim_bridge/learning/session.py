@@ -22,8 +22,8 @@ from sim_bridge.learning.dense import Array
 from sim_bridge.learning.greedy import GreedyPolicy
 from sim_bridge.learning.learner import Learner
 from sim_bridge.learning.trainer import Progress, Trainer
-from sim_bridge.scenario import load_scenario
-from sim_bridge.simulation import Simulation
+from sim_bridge.scenarios.loading import load_scenario
+from sim_bridge.simulation.simulation import Simulation
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,8 @@ from risk_dqn_planner.decision import Action
 from risk_dqn_planner.intersection.config import IntersectionConfig
 from risk_dqn_planner.map.loader import RoadMap
 from sim_bridge.environment.place import place_on
-from sim_bridge.scenario import load_scenario
-from sim_bridge.simulation import Simulation
+from sim_bridge.scenarios.loading import load_scenario
+from sim_bridge.simulation.simulation import Simulation
 
 
 class SimulationShelf:

@@ -8,7 +8,7 @@ from risk_dqn_planner.ros.conversions import SECOND_NS
 from sim_bridge.ros.pacing import Pacing
 from sim_bridge.ros.planner_link import DECISION_PERIOD_NS, EPISODE_GAP_NS
 from sim_bridge.ros.publishing import FramePublisher
-from sim_bridge.simulation import Simulation, StepResult
+from sim_bridge.simulation.simulation import Simulation, StepResult
 
 
 class EpisodePlayer:

@@ -11,8 +11,8 @@ from risk_dqn_planner.decision import Action
 from risk_dqn_planner.intersection.builder import build_intersection
 from risk_dqn_planner.map.loader import load_map
 from risk_dqn_planner.ros.conversions import SECOND_NS, polygon_from_message
-from sim_bridge.frames import Floats, Frame, VehicleFrame
-from sim_bridge.render import save_episode_picture
+from sim_bridge.rendering.frames import Floats, Frame, VehicleFrame
+from sim_bridge.rendering.render import save_episode_picture
 from sim_bridge.ros.drive import DrivenEpisode
 from sim_bridge.ros.run_settings import RunSettings
 from sim_bridge.ros.summary import episode_result

@@ -7,10 +7,10 @@ from rclpy.node import Node
 
 from risk_dqn_planner.ros import conversions
 from risk_dqn_planner.situation.inputs import EgoPose, ObjectArrays
-from sim_bridge.perception import VehiclePoses
+from sim_bridge.perception.perception import VehiclePoses
 from sim_bridge.ros import topics
 from sim_bridge.ros.transform import TransformPublisher
-from sim_bridge.simulation import Simulation, StepResult
+from sim_bridge.simulation.simulation import Simulation, StepResult
 
 EGO_ID = 0
 _NODE = "simulator"

@@ -12,7 +12,7 @@ from risk_dqn_planner.map.route import parse_route
 from sim_bridge.maps import map_names, shipped_map
 from sim_bridge.ros.process import NodeCommand, ParameterValue
 from sim_bridge.ros.topics import remappings
-from sim_bridge.scenario import load_scenario
+from sim_bridge.scenarios.loading import load_scenario
 
 DEFAULT_MAP = "four_way"
 DEFAULT_PROJECTOR = "utm"

@@ -19,7 +19,7 @@ from sim_bridge.ros.pacing import LockStep, RealTime, WallPace
 from sim_bridge.ros.planner_link import PlannerLink
 from sim_bridge.ros.publishing import FramePublisher
 from sim_bridge.ros.simulator_parameters import SimulatorParameters, declare_route
-from sim_bridge.simulation import Simulation
+from sim_bridge.simulation.simulation import Simulation
 
 _WATCH_PERIOD_S = 0.2
 _PATIENCE_S = 10.0

@@ -13,9 +13,9 @@ from sim_bridge.environment.interface import EnvironmentStep, Outcome
 from sim_bridge.environment.place import Place, load_place
 from sim_bridge.environment.rewards import reward_named
 from sim_bridge.environment.seeds import training_seeds
-from sim_bridge.scenario import load_scenario
-from sim_bridge.scenario_fields import Timing
-from sim_bridge.simulation import Simulation
+from sim_bridge.scenarios.fields import Timing
+from sim_bridge.scenarios.loading import load_scenario
+from sim_bridge.simulation.simulation import Simulation
 
 
 @lru_cache

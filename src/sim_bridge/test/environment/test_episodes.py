@@ -6,7 +6,7 @@ from risk_dqn_planner.policies.loading import load_policy
 from sim_bridge.environment.episodes import drive
 from sim_bridge.environment.interface import Outcome
 from sim_bridge.environment.place import load_place
-from sim_bridge.scenario import load_scenario
+from sim_bridge.scenarios.loading import load_scenario
 
 
 def test_every_episode_ends_and_its_outcome_fits_its_figures() -> None:

@@ -14,10 +14,10 @@ from sim_bridge.evaluation import clairvoyant
 from sim_bridge.evaluation.bounds import Rules, lower_bounds, speeds_from
 from sim_bridge.evaluation.clairvoyant import ClairvoyantPolicy, Optima, film, optima
 from sim_bridge.evaluation.search import IMPOSSIBLE
-from sim_bridge.scenario import Scenario
-from sim_bridge.scenario_fields import EgoStart, Interval, Obstacles, Timing
-from sim_bridge.settings import EgoDrive
-from sim_bridge.simulation import Simulation
+from sim_bridge.scenarios.fields import EgoStart, Interval, Obstacles, Timing
+from sim_bridge.scenarios.loading import Scenario
+from sim_bridge.simulation.settings import EgoDrive
+from sim_bridge.simulation.simulation import Simulation
 
 DECISIONS = 8
 SEEDS = np.arange(40)

@@ -7,8 +7,8 @@ from risk_dqn_planner.intersection.model import IntersectionModel
 from sim_bridge.environment.interface import Outcome
 from sim_bridge.evaluation.rollout import Driven, contestant, joined, roll_out
 from sim_bridge.evaluation.summary import summarise
-from sim_bridge.scenario import Scenario
-from sim_bridge.simulation import Simulation
+from sim_bridge.scenarios.loading import Scenario
+from sim_bridge.simulation.simulation import Simulation
 
 SEEDS = np.arange(50)
 

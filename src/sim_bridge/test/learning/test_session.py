@@ -18,7 +18,7 @@ from sim_bridge.learning.config import EvaluationConfig, LearnerConfig, ReplayCo
 from sim_bridge.learning.export import initial_weights
 from sim_bridge.learning.session import Run, Score, Session
 from sim_bridge.learning.train import main
-from sim_bridge.scenario import load_scenario
+from sim_bridge.scenarios.loading import load_scenario
 
 TINY = Run(
     config=TrainingConfig(

@@ -4,9 +4,9 @@ import pytest
 
 from risk_dqn_planner.situation.inputs import EgoPose
 from sim_bridge.environment.place import load_place
-from sim_bridge.perception import VehiclePoses
+from sim_bridge.perception.perception import VehiclePoses
 from sim_bridge.ros.publishing import ground_truth, perceived
-from sim_bridge.scenario import load_scenario
+from sim_bridge.scenarios.loading import load_scenario
 
 
 def poses(hidden: list[bool], present: list[bool]) -> VehiclePoses:

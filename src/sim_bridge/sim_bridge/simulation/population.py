@@ -1,0 +1,241 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How other vehicles come and go, and where there is room for them."""
+
+import math
+
+import numpy as np
+
+from risk_dqn_planner.compiled import kernel
+from risk_dqn_planner.geometry.footprint import footprints_overlap
+from risk_dqn_planner.situation.situations import Booleans, Floats, Integers
+from sim_bridge.perception.visibility import cast_shadows, point_hidden
+from sim_bridge.simulation.randomness import (
+    VEHICLE_STREAM,
+    random_between,
+    random_index,
+    random_share,
+)
+from sim_bridge.simulation.settings import Draws, Settings
+from sim_bridge.simulation.state import (
+    NOBODY,
+    Episodes,
+    Vehicles,
+)
+from sim_bridge.world.path_geometry import table_pose
+from sim_bridge.world.sharing import Sharing
+from sim_bridge.world.world import EgoLane, Lanes, Paths
+
+_DRAWS_PER_VEHICLE = 4
+# Between footprints, on whatever lanes.
+_CLEARANCE_M = 0.5
+
+
+@kernel
+def has_room(
+    b: int,
+    i: int,
+    p: int,
+    s: float,
+    desired_mps: float,
+    gap_m: float,
+    headway_s: float,
+    driving: Booleans,
+    path: Integers,
+    s_m: Floats,
+    speed_mps: Floats,
+    table: Floats,
+    length_m: float,
+    width_m: float,
+    low_m: Floats,
+    high_m: Floats,
+    offset_m: Floats,
+    touches: Booleans,
+) -> bool:
+    """Tell whether a vehicle may be put into place i of episode b, at s on path p.
+
+    Behind the next one and ahead of the one behind there must be the standstill gap and the
+    headway; nobody's footprint may come near, whatever lane it is on. Arrays as in Vehicles,
+    Paths and Sharing.
+    """
+    least_m = length_m + gap_m
+    for j in range(driving.shape[1]):
+        if j == i or not driving[b, j]:
+            continue
+        q, other = path[b, j], s_m[b, j]
+        if low_m[p, q] <= other <= high_m[p, q]:
+            ahead = other + offset_m[p, q] - s
+            if 0.0 <= ahead < least_m + headway_s * desired_mps:
+                return False
+        if low_m[q, p] <= s <= high_m[q, p]:
+            behind = s + offset_m[q, p] - other
+            if 0.0 <= behind < least_m + headway_s * speed_mps[b, j]:
+                return False
+        if p != q and touches[p, q]:
+            x1, y1, heading1 = table_pose(table, p, s)
+            x2, y2, heading2 = table_pose(table, q, other)
+            length, width = length_m + _CLEARANCE_M, width_m + _CLEARANCE_M
+            if footprints_overlap(x1, y1, heading1, length, width, x2, y2, heading2, length, width):
+                return False
+    return True
+
+
+@kernel
+def draw_vehicle(
+    seed: np.uint64, number: int, draws: Draws, first_entry: Integers, entry_path: Integers
+) -> tuple[int, float, bool]:
+    """Return path, desired speed and whether it yields, of the vehicle with an id.
+
+    All depends on seed and id alone. first_entry and entry_path as in Lanes.
+    """
+    draw = number * _DRAWS_PER_VEHICLE
+    # A lane first, so that lanes with many ways in do not have more traffic than others.
+    lane = random_index(seed, VEHICLE_STREAM, draw, len(first_entry) - 1)
+    first, behind = first_entry[lane], first_entry[lane + 1]
+    way = random_index(seed, VEHICLE_STREAM, draw + 1, behind - first)
+    low, high = draws.desired_speed_mps
+    desired = random_between(seed, VEHICLE_STREAM, draw + 2, low, high)
+    share = random_share(seed, VEHICLE_STREAM, draw + 3)
+    return entry_path[first + way], desired, share < draws.yielding_share
+
+
+@kernel
+def entry_in_sight(
+    ego: EgoLane,
+    paths: Paths,
+    corners: Floats,
+    settings: Settings,
+    episodes: Episodes,
+    b: int,
+    p: int,
+    shadows: Floats,
+) -> bool:
+    """Tell whether the ego sees where vehicles enter on path p.
+
+    corners (2, K, 4, 2): catalogue of the obstacles; shadows (B, O, 4, 3): memory to work in.
+    """
+    x, y, _ = table_pose(paths.table, p, 0.0)
+    sensor_x, sensor_y, heading = table_pose(ego.table, 0, episodes.ego_s_m[b])
+    sensor_x += settings.sensor_offset_m * math.cos(heading)
+    sensor_y += settings.sensor_offset_m * math.sin(heading)
+    count = cast_shadows(corners, episodes.obstacle, b, sensor_x, sensor_y, shadows, b)
+    range_m = settings.sensor_range_m
+    return not point_hidden(x, y, sensor_x, sensor_y, range_m, shadows, b, count)
+
+
+@kernel
+def replace_those_gone(
+    paths: Paths, lanes: Lanes, draws: Draws, episodes: Episodes, vehicles: Vehicles
+) -> None:
+    """Where a decision is due, empty the places of vehicles that have left their path.
+
+    With respawning traffic a new vehicle, with a new id, waits for each.
+    """
+    running, phase, seed, next_id = (
+        episodes.running,
+        episodes.phase,
+        episodes.seed,
+        episodes.next_id,
+    )
+    driving, waiting, path, s_m = vehicles.driving, vehicles.waiting, vehicles.path, vehicles.s_m
+    ids, yields, follows_ego = vehicles.id, vehicles.yields, vehicles.follows_ego
+    desired_mps, leader, leader_due = (
+        vehicles.desired_speed_mps,
+        vehicles.leader,
+        vehicles.leader_due,
+    )
+    length_m, limit_mps = paths.length_m, paths.limit_mps
+    first_entry, entry_path = lanes.first_entry, lanes.entry_path
+    batch, count = driving.shape
+    for b in range(batch):
+        if not running[b] or phase[b] != 0:
+            continue
+        for i in range(count):
+            if not driving[b, i] or s_m[b, i] <= length_m[path[b, i]]:
+                continue
+            driving[b, i], waiting[b, i] = False, draws.respawn
+            for j in range(count):
+                leader_due[b, j] |= leader[b, j] == i
+            p, desired, yields[b, i] = draw_vehicle(
+                seed[b], next_id[b], draws, first_entry, entry_path
+            )
+            path[b, i], desired_mps[b, i] = p, min(desired, limit_mps[p])
+            ids[b, i], follows_ego[b, i] = next_id[b], False
+            next_id[b] += 1
+
+
+@kernel
+def let_one_in(
+    ego: EgoLane,
+    paths: Paths,
+    sharing: Sharing,
+    corners: Floats,
+    settings: Settings,
+    episodes: Episodes,
+    vehicles: Vehicles,
+    shadows: Floats,
+) -> None:
+    """Where a decision is due, let one of the waiting vehicles in if there is room, in turn.
+
+    Nobody appears out of nothing: an entry within the sensor's range must be out of sight.
+    corners (2, K, 4, 2): the obstacles' catalogue; shadows (B, O, 4, 3): memory to work in.
+    """
+    running, phase, tick = episodes.running, episodes.phase, episodes.tick
+    driving, waiting, path, s_m = vehicles.driving, vehicles.waiting, vehicles.path, vehicles.s_m
+    speed_mps, desired_mps, due = (
+        vehicles.speed_mps,
+        vehicles.desired_speed_mps,
+        vehicles.leader_due,
+    )
+    low_m, high_m, offset_m, touches = (
+        sharing.low_m,
+        sharing.high_m,
+        sharing.offset_m,
+        sharing.touches,
+    )
+    table, entry_is_far = paths.table, paths.entry_is_far
+    length_m, width_m = paths.vehicle_length_m, paths.vehicle_width_m
+    gap_m, headway_s = settings.idm.standstill_gap_m, settings.draws.headway_s
+    for b in range(len(running)):
+        if not running[b] or phase[b] != 0:
+            continue
+        chosen = first_waiting(waiting, b, tick[b] // settings.decision_steps)
+        if chosen == NOBODY:
+            continue
+        p, desired = path[b, chosen], desired_mps[b, chosen]
+        if not entry_is_far[p] and entry_in_sight(
+            ego, paths, corners, settings, episodes, b, p, shadows
+        ):
+            continue
+        if has_room(
+            b,
+            chosen,
+            p,
+            0.0,
+            desired,
+            gap_m,
+            headway_s,
+            driving,
+            path,
+            s_m,
+            speed_mps,
+            table,
+            length_m,
+            width_m,
+            low_m,
+            high_m,
+            offset_m,
+            touches,
+        ):
+            driving[b, chosen], waiting[b, chosen], due[b, chosen] = True, False, True
+            s_m[b, chosen], speed_mps[b, chosen] = 0.0, desired
+
+
+@kernel
+def first_waiting(waiting: Booleans, b: int, turn: int) -> int:
+    """Return the first place of episode b that waits, beginning with whose turn it is; -1 none."""
+    begin = turn % max(waiting.shape[1], 1)
+    found = NOBODY
+    for i in range(waiting.shape[1]):
+        if waiting[b, i] and (found == NOBODY or found < begin <= i):
+            found = i
+    return found

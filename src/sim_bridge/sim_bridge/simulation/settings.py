@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The numbers of a scenario and of the vehicles, flattened for compiled code."""
+
+import math
+from typing import NamedTuple
+
+from risk_dqn_planner.vehicle import EgoLimits
+from sim_bridge.scenarios.fields import CarFollowing, Scenario
+
+
+class Idm(NamedTuple):
+    """`CarFollowing` for kernels; half_inverse_root_ab is 1 / (2 sqrt(a b))."""
+
+    acceleration_mps2: float
+    comfortable_mps2: float
+    half_inverse_root_ab: float
+    time_headway_s: float
+    standstill_gap_m: float
+    strongest_mps2: float
+
+
+class EgoDrive(NamedTuple):
+    """`EgoLimits` for kernels."""
+
+    acceleration_mps2: float
+    braking_mps2: float
+    slow_mps: float
+    fast_mps: float
+
+
+class Draws(NamedTuple):
+    """The scenario's random quantities for kernels: pairs of low and high."""
+
+    ego_distance_m: tuple[float, float]
+    ego_speed_mps: tuple[float, float]
+    vehicles: tuple[int, int]
+    start_distance_m: tuple[float, float]
+    desired_speed_mps: tuple[float, float]
+    headway_s: float
+    respawn: bool
+    yielding_share: float
+
+
+class Settings(NamedTuple):
+    """All numbers that kernels read; steps are inner steps."""
+
+    step_s: float
+    decision_steps: int
+    limit_steps: int
+    ego: EgoDrive
+    idm: Idm
+    draws: Draws
+    sensor_range_m: float
+    sensor_offset_m: float
+    velocity_noise_mps: float
+
+
+def settings_of(scenario: Scenario, limits: EgoLimits) -> Settings:
+    """Flatten a scenario and the ego's limits."""
+    traffic, timing, sensor = scenario.traffic, scenario.timing, scenario.sensor
+    speeds = scenario.ego.speed_mps
+    draws = Draws(
+        ego_distance_m=(scenario.ego.distance_m.low, scenario.ego.distance_m.high),
+        ego_speed_mps=(min(speeds.low, limits.fast_mps), min(speeds.high, limits.fast_mps)),
+        vehicles=(int(traffic.vehicles.low), int(traffic.vehicles.high)),
+        start_distance_m=(traffic.start_distance_m.low, traffic.start_distance_m.high),
+        desired_speed_mps=(traffic.desired_speed_mps.low, traffic.desired_speed_mps.high),
+        headway_s=traffic.headway_s,
+        respawn=traffic.respawn,
+        yielding_share=traffic.yielding_share,
+    )
+    return Settings(
+        step_s=timing.inner_step_s,
+        decision_steps=timing.inner_steps,
+        limit_steps=timing.limit_steps,
+        ego=EgoDrive(
+            limits.acceleration_mps2, limits.braking_mps2, limits.slow_mps, limits.fast_mps
+        ),
+        idm=idm_of(traffic.car_following),
+        draws=draws,
+        sensor_range_m=sensor.range_m,
+        sensor_offset_m=sensor.forward_offset_m,
+        velocity_noise_mps=sensor.velocity_noise_mps,
+    )
+
+
+def idm_of(config: CarFollowing) -> Idm:
+    """Flatten the parameters of the car-following model."""
+    root = math.sqrt(config.acceleration_mps2 * config.comfortable_braking_mps2)
+    return Idm(
+        acceleration_mps2=config.acceleration_mps2,
+        comfortable_mps2=config.comfortable_braking_mps2,
+        half_inverse_root_ab=0.5 / root,
+        time_headway_s=config.time_headway_s,
+        standstill_gap_m=config.standstill_gap_m,
+        strongest_mps2=config.strongest_braking_mps2,
+    )

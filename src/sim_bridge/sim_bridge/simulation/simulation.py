@@ -1,0 +1,270 @@
+# SPDX-License-Identifier: Apache-2.0
+"""B simulated episodes side by side; the ROS node is a batch of one, training one of thousands."""
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from risk_dqn_planner.decision import Action
+from risk_dqn_planner.errors import ConfigurationError
+from risk_dqn_planner.intersection.model import IntersectionModel
+from risk_dqn_planner.situation.situations import (
+    Booleans,
+    Floats,
+    Integers,
+    Situations,
+    empty_situations,
+)
+from risk_dqn_planner.vehicle import EgoLimits
+from sim_bridge.perception.perception import VehiclePoses, empty_view, perceive, reveal
+from sim_bridge.perception.visible_area import visible_polygon
+from sim_bridge.scenarios.fields import Scenario
+from sim_bridge.simulation.settings import settings_of
+from sim_bridge.simulation.starting import start_episodes
+from sim_bridge.simulation.state import NOBODY, empty_state
+from sim_bridge.simulation.stepping import advance
+from sim_bridge.world.matches import most_lanes_at_once
+from sim_bridge.world.path_geometry import table_pose
+from sim_bridge.world.world import build_world
+
+
+class StepResult(NamedTuple):
+    """How B episodes stand after a step, all (B,).
+
+    An ended episode keeps its flags and no longer changes until it is reset.
+    ran: it was running when the step began. terminated: reached_goal or collided, a terminal
+    state. truncated: timed_out, where learning has to bootstrap (SPEC 4).
+    """
+
+    ran: Booleans
+    reached_goal: Booleans
+    collided: Booleans
+    timed_out: Booleans
+    terminated: Booleans
+    truncated: Booleans
+
+
+class EpisodeStatistics(NamedTuple):
+    """Figures of B episodes so far, all (B,) but action_counts (B, 3), by `Action`.
+
+    Actions and hard brakes (steps that take more than 1 m/s off) are counted in decision steps.
+    least_time_gap_s: shortest time between the ego's and another vehicle's being in a conflict
+    zone, infinity if there was none.
+    """
+
+    duration_s: Floats
+    progress_m: Floats
+    mean_speed_mps: Floats
+    action_counts: Integers
+    action_changes: Integers
+    hard_brakes: Integers
+    least_time_gap_s: Floats
+
+
+class Simulation:
+    """B episodes of one scenario at one intersection.
+
+    Public for reading: `model`, `scenario`, `batch`, `world`, `settings` and `state` (see
+    SimulationState). The same seed gives the same episode in any batch.
+    """
+
+    def __init__(
+        self,
+        model: IntersectionModel,
+        scenario: Scenario,
+        batch: int,
+        world_seed: int = 0,
+        keep_out: Sequence[NDArray[np.float64]] = (),
+        ego_limits: EgoLimits | None = None,
+    ) -> None:
+        """Lay out the scenario; `world_seed` and `keep_out` as in `build_world`.
+
+        Raises:
+            ConfigurationError: the batch is empty.
+            ScenarioError, NoConflictError: the scenario does not fit the model.
+        """
+        if batch < 1:
+            raise ConfigurationError(f"batch is {batch}, expected at least 1")
+        self.model = model
+        self.scenario = scenario
+        self.batch = batch
+        self.world = build_world(model, scenario, world_seed, keep_out)
+        self.settings = settings_of(scenario, ego_limits or EgoLimits())
+        vehicles = int(scenario.traffic.vehicles.high)
+        obstacles = 2 * scenario.obstacles.per_side
+        self.state = empty_state(batch, vehicles, obstacles, len(model.lanes))
+        self._view = empty_view(batch, vehicles, obstacles)
+
+    def reset(self, seeds: ArrayLike, mask: ArrayLike | None = None) -> None:
+        """Start the episodes of seeds (B,), or only those that `mask` (B,) names.
+
+        Raises:
+            ConfigurationError: seeds or mask do not have the batch's shape.
+        """
+        given = np.asarray(seeds)
+        chosen = np.ones(self.batch, dtype=np.bool_) if mask is None else np.asarray(mask)
+        for name, array in (("seeds", given), ("mask", chosen)):
+            if array.shape != (self.batch,):
+                raise ConfigurationError(
+                    f"{name} has shape {array.shape}, expected ({self.batch},)"
+                )
+        world = self.world
+        start_episodes(
+            world.ego.stop_line_m,
+            world.paths,
+            world.lanes,
+            world.sharing,
+            world.obstacles.available,
+            self.settings,
+            self.state,
+            np.ascontiguousarray(given.astype(np.uint64)),
+            np.ascontiguousarray(chosen.astype(np.bool_)),
+        )
+
+    def step(self, actions: ArrayLike) -> StepResult:
+        """Carry out actions (B,) for one decision period.
+
+        Raises:
+            ConfigurationError: actions of the wrong shape, or not of `Action`.
+        """
+        return self._advance(actions, self.settings.decision_steps)
+
+    def inner_step(self, actions: ArrayLike) -> StepResult:
+        """Carry out actions (B,) for one inner step; `step` is a decision period of them."""
+        return self._advance(actions, 1)
+
+    def _advance(self, actions: ArrayLike, steps: int) -> StepResult:
+        given = np.ascontiguousarray(actions, dtype=np.int64)
+        if given.shape != (self.batch,):
+            raise ConfigurationError(f"actions has shape {given.shape}, expected ({self.batch},)")
+        if given.min() < min(Action) or given.max() > max(Action):
+            raise ConfigurationError(
+                f"actions range from {given.min()} to {given.max()}, expected 0 to {max(Action)}"
+            )
+        episodes = self.state.episodes
+        ran = episodes.running.copy()
+        world = self.world
+        advance(
+            world.ego,
+            world.paths,
+            world.lanes,
+            world.sharing,
+            world.crossings,
+            world.ego_sharing,
+            world.obstacles.corners,
+            self.settings,
+            self.state,
+            given,
+            self._view.shadows,
+            steps,
+        )
+        return StepResult(
+            ran=ran,
+            reached_goal=episodes.reached_goal.copy(),
+            collided=episodes.collided.copy(),
+            timed_out=episodes.timed_out.copy(),
+            terminated=episodes.reached_goal | episodes.collided,
+            truncated=episodes.timed_out.copy(),
+        )
+
+    def situations(self, out: Situations | None = None) -> Situations:
+        """Return what the planner perceives; hidden vehicles are absent.
+
+        `out`, an earlier result of this simulation, is overwritten instead of taking new memory.
+        """
+        result = out if out is not None else self._empty_situations()
+        episodes, vehicles, _ = self.state
+        world = self.world
+        perceive(
+            world.ego,
+            world.paths.table,
+            world.lanes,
+            world.matches,
+            world.sight,
+            world.obstacles.corners,
+            self.settings,
+            episodes,
+            vehicles,
+            self._view,
+            result,
+        )
+        return result
+
+    def _empty_situations(self) -> Situations:
+        places = self.state.vehicles.driving.shape[1] * most_lanes_at_once(self.world.matches)
+        result = empty_situations(self.batch, max(places, 1), len(self.model.lanes))
+        lanes = self.world.lanes
+        result.lane_mask[:] = True
+        result.lane_id[:] = lanes.id
+        result.lane_merging[:] = lanes.merging
+        result.lane_speed_limit_mps[:] = lanes.limit_mps
+        result.lane_ego_zone_m[:] = lanes.ego_zone_m
+        result.lane_zone_m[:] = lanes.zone_m
+        return result
+
+    def statistics(self) -> EpisodeStatistics:
+        """Return the figures of the episodes so far."""
+        episodes, _, counted = self.state
+        duration = episodes.tick.astype(np.float64) * self.settings.step_s
+        progress = episodes.ego_s_m - counted.start_s_m
+        return EpisodeStatistics(
+            duration_s=duration,
+            progress_m=progress,
+            mean_speed_mps=progress / np.maximum(duration, self.settings.step_s),
+            action_counts=counted.action_counts.copy(),
+            action_changes=counted.action_changes.copy(),
+            hard_brakes=counted.hard_brakes.copy(),
+            least_time_gap_s=counted.least_time_gap_s.copy(),
+        )
+
+    def ego_poses(self) -> Floats:
+        """Return x, y, heading, speed of the egos (B, 4)."""
+        episodes = self.state.episodes
+        poses = [table_pose(self.world.ego.table, 0, s) for s in episodes.ego_s_m]
+        return np.column_stack((np.array(poses), episodes.ego_speed_mps))
+
+    def vehicle_poses(self) -> VehiclePoses:
+        """Return the truth about all vehicles, seen or hidden."""
+        episodes, vehicles, _ = self.state
+        shape = vehicles.driving.shape
+        poses = VehiclePoses(
+            mask=vehicles.driving.copy(),
+            id=vehicles.id.copy(),
+            x_m=np.zeros(shape),
+            y_m=np.zeros(shape),
+            heading_rad=np.zeros(shape),
+            speed_mps=vehicles.speed_mps.copy(),
+            measured_speed_mps=np.zeros(shape),
+            hidden=np.zeros(shape, dtype=np.bool_),
+        )
+        world, view = self.world, self._view
+        reveal(
+            world.ego,
+            world.paths.table,
+            world.obstacles.corners,
+            self.settings,
+            episodes,
+            vehicles,
+            view,
+            poses,
+        )
+        poses.hidden[:] = vehicles.driving & ~view.seen
+        poses.measured_speed_mps[:] = view.measured_mps
+        return poses
+
+    def obstacles(self, episode: int = 0) -> list[Floats]:
+        """Return the corners (4, 2) of one episode's obstacles, counter-clockwise."""
+        chosen = self.state.episodes.obstacle[episode]
+        corners = self.world.obstacles.corners
+        return [corners[o % 2, k].copy() for o, k in enumerate(chosen) if k != NOBODY]
+
+    def visible_area(self, episode: int = 0) -> Floats:
+        """Return the polygon (K, 2) that one episode's ego sees."""
+        s = self.state.episodes.ego_s_m[episode]
+        x, y, heading = table_pose(self.world.ego.table, 0, s)
+        x += self.settings.sensor_offset_m * math.cos(heading)
+        y += self.settings.sensor_offset_m * math.sin(heading)
+        return visible_polygon(x, y, self.settings.sensor_range_m, self.obstacles(episode))

@@ -26,7 +26,7 @@ PRESETS = {
         n_step=1,
         replay=ReplayConfig(capacity=50_000),
         learner=LearnerConfig(learning_rate=1e-5, learning_rate_end=1e-5, target_rate=0.2),
-        evaluation=EvaluationConfig(every_episodes=50, episodes=20),
+        evaluation=EvaluationConfig(every_episodes=50, episodes=20, validation_episodes=2_000),
     ),
     "tuned": TrainingConfig(
         preset="tuned",
@@ -46,7 +46,7 @@ PRESETS = {
             max_gradient_norm=10.0,
         ),
         evaluation=EvaluationConfig(
-            every_episodes=1_000, episodes=20, validation_every=2, validation_episodes=500
+            every_episodes=1_000, episodes=20, validation_every=2, validation_episodes=2_000
         ),
     ),
 }

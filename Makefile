@@ -27,7 +27,7 @@ RUN_OPTIONS = $(call option,--map,MAP) $(call option,--route,ROUTE) $(call optio
   $(call option,--scenario,SCENARIO) $(call option,--episodes,EPISODES) $(call option,--seed,SEED) \
   $(call option,--rate,RATE) $(call option,--out,OUT)
 
-.PHONY: help setup demo test replay bags maps train evaluate bench shell format lint types check clean distclean
+.PHONY: help setup demo test replay bags maps train evaluate ship bench shell format lint types check clean distclean
 
 help: ## list the targets
 	@echo 'make TARGET, where TARGET is one of'
@@ -62,6 +62,10 @@ evaluate: ## drive policies through the paper's cells [EPISODES POLICIES SCENARI
 	@$(WITH_ROS) $(SIMULATION)/evaluate $(call option,--episodes,EPISODES) \
 	  $(call option,--policies,POLICIES) $(call option,--scenarios,SCENARIOS) \
 	  $(call option,--map,MAP) $(call option,--route,ROUTE) $(call option,--origin,ORIGIN) $(ARGS)
+
+ship: ## ship a trained run, without RUN only write the cards [RUN=out/training/... NAME RESULTS]
+	@$(WITH_ROS) $(SIMULATION)/ship $(call option,--run,RUN) $(call option,--name,NAME) \
+	  $(call option,--results,RESULTS) $(ARGS)
 
 bench: ## run the benchmarks
 	@$(WITH_ROS) bash -c 'for script in src/*/benchmarks/bench_*.py; do \

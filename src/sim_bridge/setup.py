@@ -48,6 +48,7 @@ setup(
             "evaluate = sim_bridge.evaluation.evaluate:main",
             "record = sim_bridge.ros.record:main",
             "replay = sim_bridge.ros.replay:main",
+            "ship = sim_bridge.learning.ship:main",
             "simulator_node = sim_bridge.ros.simulator_node:main",
             "train = sim_bridge.learning.train:main",
         ],

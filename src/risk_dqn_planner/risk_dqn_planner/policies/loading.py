@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Policies by name: built in, from a policy file, or a user's own factory."""
+"""Policies by name: built in, trained, from a policy file, or a user's own factory."""
 
 import importlib
 from collections.abc import Callable, Mapping
@@ -10,6 +10,7 @@ from risk_dqn_planner.errors import PolicyError, UnknownPolicyError
 from risk_dqn_planner.policies.base import Action, Policy, StopsAtGoal
 from risk_dqn_planner.policies.constant import ConstantPolicy
 from risk_dqn_planner.policies.rule_based import RuleBasedConfig, RuleBasedPolicy
+from risk_dqn_planner.policies.shipped import ShippedPolicy, shipped_policies
 from risk_dqn_planner.state.encoding import StateConfig
 
 PolicyFactory = Callable[[RuleBasedConfig], Policy]
@@ -35,30 +36,49 @@ def load_policy(
 ) -> Policy:
     """Return a policy that stops at the goal.
 
-    name: a built-in policy, a policy file ("path/to/policy.pt"), or "module:factory", where the
-    factory takes a RuleBasedConfig and returns a Policy. config: prediction of Algorithm 1, for
-    the rule itself and for the risks shown with any decision. state: what a policy file must
-    have been trained on, by default StateConfig().
+    name: a built-in policy, one of the trained policies that come with the planner, a policy
+    file ("path/to/policy.pt"), or "module:factory", where the factory takes a RuleBasedConfig
+    and returns a Policy. config: prediction of Algorithm 1, for the rule itself and for the
+    risks shown with any decision. state: what a policy file must have been trained on, by
+    default StateConfig().
     Raises UnknownPolicyError for a name that is none of these, PolicyFileError for a file that
     cannot be used, PolicyError for a factory that fails.
     """
     config = config or RuleBasedConfig()
+    state = state or StateConfig()
     if name in BUILT_IN:
         policy = BUILT_IN[name](config)
     elif name.endswith(".pt"):
-        policy = _from_file(Path(name), config, state or StateConfig())
+        policy = _from_file(Path(name), config, state)
     elif ":" in name:
         policy = _from_factory(name, config)
     else:
-        known = ", ".join(sorted(BUILT_IN))
-        raise UnknownPolicyError(
-            f"there is no policy '{name}', expected one of: {known}; "
-            "or a policy file (.pt), or a factory (module:function)"
-        )
+        shipped = _shipped(name)
+        policy = _from_file(shipped.path, config, state, shipped)
     return StopsAtGoal(policy)
 
 
-def _from_file(path: Path, config: RuleBasedConfig, state: StateConfig) -> Policy:
+def policy_names() -> list[str]:
+    """Return the names of all policies that need no file or factory of the user's.
+
+    Raises PolicyFileError if the trained policies are not installed.
+    """
+    return sorted(BUILT_IN.keys() | shipped_policies().keys())
+
+
+def _shipped(name: str) -> ShippedPolicy:
+    found = shipped_policies().get(name)
+    if found is None:
+        raise UnknownPolicyError(
+            f"there is no policy '{name}', expected one of: {', '.join(policy_names())}; "
+            "or a policy file (.pt), or a factory (module:function)"
+        )
+    return found
+
+
+def _from_file(
+    path: Path, config: RuleBasedConfig, state: StateConfig, shipped: ShippedPolicy | None = None
+) -> Policy:
     # Torch takes seconds to load and is not needed unless a network is asked for.
     from risk_dqn_planner.policies.learned import LearnedPolicy  # noqa: PLC0415
     from risk_dqn_planner.policies.policy_file import (  # noqa: PLC0415
@@ -69,8 +89,11 @@ def _from_file(path: Path, config: RuleBasedConfig, state: StateConfig) -> Polic
     expected = PolicyContract(
         name="", state=state, ego=config.risk.ego, decision_period_s=config.decision_period_s
     )
-    file = load_policy_file(path, expected)
-    return LearnedPolicy(file.module, file.name, file.sha256, state, config)
+    if shipped is None:
+        file = load_policy_file(path, expected)
+        return LearnedPolicy(file.module, file.name, file.sha256, state, config)
+    file = load_policy_file(path, expected, shipped.sha256)
+    return LearnedPolicy(file.module, shipped.name, file.sha256, state, config)
 
 
 def _from_factory(name: str, config: RuleBasedConfig) -> Policy:

@@ -90,16 +90,23 @@ def save_policy(path: Path | str, network: torch.nn.Module, contract: PolicyCont
     return hashlib.sha256(data).hexdigest()
 
 
-def load_policy_file(path: Path | str, expected: PolicyContract | None = None) -> PolicyFile:
+def load_policy_file(
+    path: Path | str, expected: PolicyContract | None = None, sha256: str | None = None
+) -> PolicyFile:
     """Read a policy file and check it against what is expected here (by default: the defaults).
 
-    Raises PolicyFileError if the file is missing, is no TorchScript, has no contract, was
-    trained for another state, other actions or another rate, or does not compute what it did.
+    sha256: of the file, where it is known; any other file is refused unread.
+    Raises PolicyFileError if the file is missing, is another one, is no TorchScript, has no
+    contract, was trained for another state, other actions or another rate, or does not compute
+    what it did.
     """
     try:
         data = Path(path).read_bytes()
     except OSError as error:
         raise PolicyFileError(f"policy file {path} cannot be read: {error.strerror}") from error
+    found = hashlib.sha256(data).hexdigest()
+    if found != (sha256 or found):
+        raise PolicyFileError(f"policy file {path} has SHA-256 {found}, expected {sha256}")
     files = {CONTRACT: ""}
     try:
         module = _deserialise(data, files)
@@ -109,7 +116,7 @@ def load_policy_file(path: Path | str, expected: PolicyContract | None = None) -
     for name, value in (expected or PolicyContract(name="")).requirements().items():
         _require_equal(path, name, contract.get(name), value)
     _check_golden(path, module.eval(), contract)
-    return PolicyFile(str(contract["name"]), module, contract, hashlib.sha256(data).hexdigest())
+    return PolicyFile(str(contract["name"]), module, contract, found)
 
 
 def _serialise(module: torch.jit.ScriptModule, files: dict[str, str]) -> bytes:

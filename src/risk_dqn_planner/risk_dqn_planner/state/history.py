@@ -7,7 +7,7 @@ import numpy as np
 
 from risk_dqn_planner.compiled import kernel
 from risk_dqn_planner.errors import InputError
-from risk_dqn_planner.situation.situations import Booleans, Integers, Situations
+from risk_dqn_planner.situation.situations import Booleans, Floats, Integers, Situations
 from risk_dqn_planner.state.encoding import (
     COLUMNS,
     LANES,
@@ -22,10 +22,10 @@ from risk_dqn_planner.state.encoding import (
 from risk_dqn_planner.state.tracks import (
     States,
     Track,
-    fill_slots,
     recall,
     remember_lanes,
     remember_vehicles,
+    scene_before,
     select,
 )
 
@@ -33,13 +33,15 @@ from risk_dqn_planner.state.tracks import (
 class Memory(NamedTuple):
     """What an encoder remembers of B rows.
 
-    known (B,): how many scenes, at most 5. scenes (B, 5, 3, 8): ring of scenes as they were.
+    known (B,): how many scenes, at most 5. scenes (B, 5, 3, C): ring of scenes as they were, the
+    first C columns: the ego, or where scenes are stacked all. ego_distance (B, M): d_e,i now.
     """
 
     known: Integers
     scenes: States
     vehicles: Track
     lanes: Track
+    ego_distance: Floats
 
 
 class StateEncoder:
@@ -55,7 +57,8 @@ class StateEncoder:
         self.config = config or StateConfig()
         self._parameters = self.config.parameters()
         self._head = 0
-        self._memory = _new_memory(0, 0, 0)
+        self._columns = COLUMNS if self.config.stacked else 1
+        self._memory = _new_memory(0, 0, 0, self._columns)
 
     def encode(
         self, situations: Situations, restart: Booleans, out: States | None = None
@@ -87,20 +90,20 @@ class StateEncoder:
                 raise InputError(
                     f"the batch has {batch} situations, expected {old.known.shape[0]} as before"
                 )
-            self._memory = _new_memory(batch, vehicles, lanes)
+            self._memory = _new_memory(batch, vehicles, lanes, self._columns)
             return
         vehicle_room, lane_room = old.vehicles.number.shape[2], old.lanes.number.shape[2]
         if vehicles > vehicle_room or lanes > lane_room:
             # Twice the need, so that a slowly filling road does not copy at every step.
             vehicle_room, lane_room = max(2 * vehicles, vehicle_room), max(lanes, lane_room)
-            self._memory = _new_memory(batch, vehicle_room, lane_room)
+            self._memory = _new_memory(batch, vehicle_room, lane_room, self._columns)
             self._memory.known[:] = old.known
             self._memory.scenes[:] = old.scenes
             _copy_track(old.vehicles, self._memory.vehicles)
             _copy_track(old.lanes, self._memory.lanes)
 
 
-def _new_memory(batch: int, vehicles: int, lanes: int) -> Memory:
+def _new_memory(batch: int, vehicles: int, lanes: int, columns: int) -> Memory:
     def track(room: int) -> Track:
         shape = (batch, SCENES, room)
         return Track(
@@ -108,13 +111,15 @@ def _new_memory(batch: int, vehicles: int, lanes: int) -> Memory:
             number=np.zeros(shape, dtype=np.int64),
             lane=np.zeros(shape, dtype=np.int64),
             values=np.zeros((*shape, ROWS), dtype=np.float32),
+            critical=np.zeros((batch, room)),
         )
 
     return Memory(
         known=np.zeros(batch, dtype=np.int64),
-        scenes=np.zeros((batch, SCENES, ROWS, COLUMNS), dtype=np.float32),
+        scenes=np.zeros((batch, SCENES, ROWS, columns), dtype=np.float32),
         vehicles=track(vehicles),
         lanes=track(lanes),
+        ego_distance=np.zeros((batch, lanes)),
     )
 
 
@@ -136,46 +141,48 @@ def encode_into(
     out: States,
 ) -> None:
     """Encode each row into `out` (B, 5, 3, 8) and remember it at place `head` of the rings."""
-    vehicle_slots, lane_slots = np.empty(VEHICLES, np.int64), np.empty(LANES, np.int64)
-    ego_distance = np.empty(s.lane_mask.shape[1])
-    critical = np.empty(max(s.vehicle_mask.shape[1], s.lane_mask.shape[1]))
-    for row in range(s.ego_speed_mps.shape[0]):
-        memory.known[row] = 1 if restart[row] else min(memory.known[row] + 1, SCENES)
-        known = memory.known[row]
-        out[row, 0, 0, 0] = encode_distance(s.stop_line_distance_m[row], p.stop_line_max_m)
-        out[row, 0, 1, 0] = encode_speed(s.ego_speed_mps[row], p.ego_speed_max_mps)
-        out[row, 0, 2, 0] = encode_distance(s.goal_distance_m[row], p.goal_max_m)
-        remember_lanes(s, row, p, head, memory.lanes, ego_distance, critical)
-        lanes = select(memory.lanes, row, head, critical, lane_slots)
-        remember_vehicles(s, row, p, head, memory.vehicles, ego_distance, critical)
-        vehicles = select(memory.vehicles, row, head, critical, vehicle_slots)
-        fill_slots(memory.vehicles, row, head, vehicle_slots, vehicles, 1, out)
-        fill_slots(memory.lanes, row, head, lane_slots, lanes, 1 + VEHICLES, out)
-        columns = COLUMNS if p.stacked else 1
-        remember_scene(memory.scenes, row, head, columns, out)
-        recall_scenes(memory.scenes, row, head, known, columns, out)
-        if not p.stacked:
-            recall(memory.vehicles, row, head, known, vehicle_slots, vehicles, 1, out)
-            recall(memory.lanes, row, head, known, lane_slots, lanes, 1 + VEHICLES, out)
+    known, scenes, ego_distance = memory.known, memory.scenes, memory.ego_distance
+    for row in range(len(known)):
+        known[row] = 1 if restart[row] else min(known[row] + 1, SCENES)
+    encode_egos(s, p, out)
+    remember_lanes(s, p, head, memory.lanes, ego_distance)
+    remember_vehicles(s, p, head, memory.vehicles, ego_distance)
+    # Stacked scenes bring their earlier slots themselves.
+    own = np.ones_like(known) if p.stacked else known
+    count = np.empty_like(known)
+    for track, slots, column in (
+        (memory.vehicles, VEHICLES, 1),
+        (memory.lanes, LANES, 1 + VEHICLES),
+    ):
+        chosen = np.empty((len(known), slots), np.int64)
+        select(track, head, chosen, count)
+        recall(track, head, own, chosen, count, column, out)
+    stack_scenes(scenes, head, known, out)
 
 
 @kernel
-def remember_scene(scenes: States, row: int, head: int, columns: int, out: States) -> None:
-    """Keep the first `columns` of the present scene as they are."""
-    for i in range(ROWS):
-        for column in range(columns):
-            scenes[row, head, i, column] = out[row, 0, i, column]
+def encode_egos(s: Situations, p: StateParameters, out: States) -> None:
+    """Fill what the present scene says about the egos."""
+    to_stop_line_m, to_goal_m = s.stop_line_distance_m, s.goal_distance_m
+    speed_mps = s.ego_speed_mps
+    for row in range(len(speed_mps)):
+        out[row, 0, 0, 0] = encode_distance(to_stop_line_m[row], p.stop_line_max_m)
+        out[row, 0, 1, 0] = encode_speed(speed_mps[row], p.ego_speed_max_mps)
+        out[row, 0, 2, 0] = encode_distance(to_goal_m[row], p.goal_max_m)
 
 
 @kernel
-def recall_scenes(
-    scenes: States, row: int, head: int, known: int, columns: int, out: States
-) -> None:
-    """Fill the first `columns` of earlier scenes as they were; unknown ones repeat the oldest."""
-    for k in range(1, SCENES):
-        then = (head - k) % SCENES
+def stack_scenes(scenes: States, head: int, known: Integers, out: States) -> None:
+    """Keep the first C columns of the present scene, and fill those of earlier scenes as they were.
+
+    scenes (B, 5, 3, C). Unknown scenes repeat the oldest.
+    """
+    for row in range(len(known)):
         for i in range(ROWS):
-            for column in range(columns):
-                out[row, k, i, column] = (
-                    scenes[row, then, i, column] if k < known else out[row, k - 1, i, column]
-                )
+            for column in range(scenes.shape[3]):
+                scenes[row, head, i, column] = out[row, 0, i, column]
+        for k in range(1, SCENES):
+            then = scene_before(head, min(k, known[row] - 1))
+            for i in range(ROWS):
+                for column in range(scenes.shape[3]):
+                    out[row, k, i, column] = scenes[row, then, i, column]

@@ -10,9 +10,14 @@ if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
 
-def require_positive(config: "DataclassInstance") -> None:
-    """Raise ConfigurationError naming the first field of a dataclass that is not above zero."""
+def require_positive(config: "DataclassInstance", skip: tuple[str, ...] = ()) -> None:
+    """Raise ConfigurationError naming the first field of a dataclass that is not above zero.
+
+    skip: names of fields that need not be.
+    """
     for field in fields(config):
+        if field.name in skip:
+            continue
         value = getattr(config, field.name)
         if not value > 0.0:
             raise ConfigurationError(

@@ -161,10 +161,12 @@ def perception_from_messages(
     check_frame(odometry.header, frame_id, "odometry")
     check_frame(visible_area.header, frame_id, "visible area")
     check_frame(objects.header, frame_id, "objects")
+    age_ns = to_ns(objects.header.stamp) - to_ns(visible_area.header.stamp)
     return Perception(
         ego_from_message(odometry, base_to_center_m),
         objects_from_message(objects),
         polygon_from_message(visible_area.polygon),
+        1e-9 * age_ns,
     )
 
 

@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Puts the lane-based situation together: one call for each message of perceived objects."""
 
+import math
+
 import numpy as np
 
 from risk_dqn_planner.intersection.model import ConflictKind, IntersectionModel
-from risk_dqn_planner.situation.config import SituationConfig
+from risk_dqn_planner.situation.config import TRACKED, SituationConfig
 from risk_dqn_planner.situation.ego import ego_progress
 from risk_dqn_planner.situation.inputs import (
     EgoPose,
@@ -14,24 +16,42 @@ from risk_dqn_planner.situation.inputs import (
     check_visible_area,
 )
 from risk_dqn_planner.situation.matching import in_footprint_kernel, match_kernel
+from risk_dqn_planner.situation.memory import LaneMemory, Look
 from risk_dqn_planner.situation.occlusion import hidden_distances_kernel
 from risk_dqn_planner.situation.paths import path_table
 from risk_dqn_planner.situation.situations import Floats, Situations, empty_situations
 
 
 class SituationBuilder:
-    """Relates what is perceived to the lanes of one intersection model."""
+    """Relates what is perceived to the lanes of one intersection model.
+
+    memory: of what has been seen, where the configuration asks for it; else None, and `build`
+    knows of nothing but its arguments.
+    """
 
     def __init__(self, model: IntersectionModel, config: SituationConfig | None = None) -> None:
         self.model = model
         self.config = config or SituationConfig()
         self._table = path_table(model)
+        self.memory: LaneMemory | None = None
+        if self.config.memory == TRACKED:
+            limits = np.array([lane.speed_limit_mps for lane in model.lanes])
+            self.memory = LaneMemory(self._table, limits, self.config)
 
-    def build(self, ego: EgoPose, objects: ObjectArrays, visible_area: Floats) -> Situations:
+    def build(
+        self,
+        ego: EgoPose,
+        objects: ObjectArrays,
+        visible_area: Floats,
+        visible_area_age_s: float = 0.0,
+        time_s: float = math.inf,
+    ) -> Situations:
         """Return the situation as a batch of one, vehicles ordered by (id, lane).
 
         visible_area: simple polygon (K, 2) in the map frame. An object whose centre lies in the
-        ego's footprint is the ego itself and is left out.
+        ego's footprint is the ego itself and is left out. The memory alone asks for
+        visible_area_age_s, how much older than the objects the area is, and time_s, when the
+        objects were perceived, on any clock; without a time nothing is remembered.
 
         Raises:
             InputError: an input is not finite or not plausible; names which.
@@ -42,13 +62,8 @@ class SituationBuilder:
         check_visible_area(visible_area)
         ego_s = ego_progress(self.model, ego, self.config)
         lanes = self.model.lanes
-        hidden = hidden_distances_kernel(
-            self._table,
-            len(lanes),
-            np.ascontiguousarray(visible_area, dtype=np.float64),
-            self.config.sensor_range_m,
-        )
         filled = self._with_vehicles(ego, objects)
+        look = Look(time_s, ego, filled, visible_area, visible_area_age_s)
         return filled._replace(
             stop_line_distance_m=np.array([self.model.stop_line.position_m - ego_s]),
             goal_distance_m=np.array([self.model.goal_m - ego_s]),
@@ -57,10 +72,21 @@ class SituationBuilder:
             lane_id=np.array([[lane.lane_id for lane in lanes]], dtype=np.int64),
             lane_merging=np.array([[lane.kind == ConflictKind.MERGING for lane in lanes]]),
             lane_ego_distance_m=np.array([[lane.ego_zone_center_m - ego_s for lane in lanes]]),
-            lane_hidden_distance_m=hidden[None, :],
+            lane_hidden_distance_m=self._hidden_distances(look)[None, :],
             lane_speed_limit_mps=np.array([[lane.speed_limit_mps for lane in lanes]]),
             lane_ego_zone_m=np.array([[lane.ego_zone_length_m for lane in lanes]]),
             lane_zone_m=np.array([[lane.zone_length_m for lane in lanes]]),
+        )
+
+    def _hidden_distances(self, look: Look) -> Floats:
+        """Return d_o (M,): how near a hidden vehicle may be, by memory or as the ego sees now."""
+        if self.memory is not None:
+            return self.memory.look(look)
+        return hidden_distances_kernel(
+            self._table,
+            len(self.model.lanes),
+            np.ascontiguousarray(look.visible_area, dtype=np.float64),
+            self.config.sensor_range_m,
         )
 
     def _with_vehicles(self, ego: EgoPose, objects: ObjectArrays) -> Situations:

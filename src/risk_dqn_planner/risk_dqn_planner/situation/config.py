@@ -7,6 +7,75 @@ from dataclasses import dataclass, field
 from risk_dqn_planner.errors import ConfigurationError
 from risk_dqn_planner.vehicle import require_positive
 
+INSTANTANEOUS = "instantaneous"
+TRACKED = "tracked"
+
+
+@dataclass(frozen=True)
+class TrackingConfig:
+    """What is assumed of hidden vehicles while they are remembered (docs/hidden_space.md)."""
+
+    min_speed_mps: float = field(
+        default=0.0,
+        metadata={
+            "description": "Hidden vehicles are never slower than this; above 0 they are taken "
+            "never to stop [m/s]",
+            "minimum": 0.0,
+            "maximum": 30.0,
+        },
+    )
+    speed_factor: float = field(
+        default=1.0,
+        metadata={
+            "description": "Hidden vehicles are never faster than the lane's limit times this",
+            "minimum": 0.1,
+            "maximum": 3.0,
+        },
+    )
+    vehicle_margin_m: float = field(
+        default=0.5,
+        metadata={
+            "description": "A vehicle may have been this far from the place along its lane where "
+            "it was last seen [m]",
+            "minimum": 0.0,
+            "maximum": 10.0,
+        },
+    )
+    visible_margin_m: float = field(
+        default=0.0,
+        metadata={
+            "description": "Places nearer than this along a lane to a hidden one are taken for "
+            "hidden [m]",
+            "minimum": 0.0,
+            "maximum": 10.0,
+        },
+    )
+    jump_m: float = field(
+        default=2.0,
+        metadata={
+            "description": "An ego this much further away than it can have driven has been "
+            "localised anew, and forgets [m]",
+            "minimum": 0.1,
+            "maximum": 100.0,
+        },
+    )
+
+    def __post_init__(self) -> None:
+        for name in self.__dataclass_fields__:
+            value = getattr(self, name)
+            if not 0.0 <= value < math.inf:
+                raise ConfigurationError(
+                    f"TrackingConfig.{name} is {value}, expected a finite number, 0 or more"
+                )
+        if not self.speed_factor > 0.0:
+            raise ConfigurationError("TrackingConfig.speed_factor is 0, expected more")
+
+
+def require_memory(kind: str) -> None:
+    """Raise ConfigurationError unless `kind` names a memory: instantaneous or tracked."""
+    if kind not in (INSTANTANEOUS, TRACKED):
+        raise ConfigurationError(f"memory is {kind!r}, expected {INSTANTANEOUS!r} or {TRACKED!r}")
+
 
 @dataclass(frozen=True)
 class SituationConfig:
@@ -55,9 +124,18 @@ class SituationConfig:
             "maximum": math.pi,
         },
     )
+    memory: str = field(
+        default=INSTANTANEOUS,
+        metadata={
+            "description": "Where hidden vehicles may be: instantaneous (wherever the ego does not "
+            "see now, as in the paper) or tracked (less what it has seen to be free)"
+        },
+    )
+    tracking: TrackingConfig = field(default_factory=TrackingConfig)
 
     def __post_init__(self) -> None:
-        require_positive(self)
+        require_positive(self, skip=("memory", "tracking"))
+        require_memory(self.memory)
         if self.max_heading_difference_rad > math.pi / 2:
             raise ConfigurationError(
                 "SituationConfig.max_heading_difference_rad is "

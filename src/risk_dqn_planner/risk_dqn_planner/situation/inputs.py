@@ -39,11 +39,15 @@ class ObjectArrays(NamedTuple):
 
 
 class Perception(NamedTuple):
-    """What is perceived at one time; visible_area is a simple polygon (K, 2) [m]."""
+    """What is perceived at one time, that of the objects; visible_area a simple polygon (K, 2) [m].
+
+    visible_area_age_s: how much older than the objects the area is; negative if newer.
+    """
 
     ego: EgoPose
     objects: ObjectArrays
     visible_area: Floats
+    visible_area_age_s: float = 0.0
 
 
 def object_arrays(

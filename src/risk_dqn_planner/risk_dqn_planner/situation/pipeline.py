@@ -41,6 +41,8 @@ class SituationPipeline:
         self.route, self.route_fault, self._builder = route, "", None
         try:
             self._builder = self._builder_of(route)
+            if self._builder.memory is not None:
+                self._builder.memory.forget()
         except PlannerError as error:
             self.route_fault = str(error)
 
@@ -57,7 +59,7 @@ class SituationPipeline:
         if self._builder is None:
             return self.route_report(stamp_ns)
         try:
-            situations = self._builder.build(*seen)
+            situations = self._builder.build(*seen, time_s=1e-9 * stamp_ns)
         except PlannerError as error:
             return self.fault(stamp_ns, fault_status(error), str(error))
         return SituationReport(

@@ -395,3 +395,36 @@ def test_the_environment_is_not_taken_for_a_sourced_ros_in_its_own_shell(machine
 
     assert machine.set_up("--no-build").stderr == ""
     assert machine.calls() == []
+
+
+def run_with_peers(machine: Machine, *command: str) -> subprocess.CompletedProcess[str]:
+    """Run tools/peers.py with a real Python, and a pip that reaches no index."""
+    return subprocess.run(
+        [sys.executable, str(machine.root / "tools" / "peers.py"), "--", *command],
+        env={"PATH": str(machine.tools), "PIP_NO_INDEX": "1", "PIP_CONFIG_FILE": "/dev/null"},
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+
+
+def test_without_the_peers_a_command_runs_and_is_told_why(machine: Machine):
+    result = run_with_peers(machine, "printenv", "PEERS_MISSING")
+
+    assert result.returncode == 0
+    assert "pip could not install the packages" in result.stdout
+    assert "Going on without the peers" in result.stderr
+
+
+def test_the_peers_see_the_packages_of_the_environment_beside_them(machine: Machine):
+    requirements = machine.root / "requirements" / "peers.txt"
+    requirements.write_text(f"pytest=={pytest.__version__}\n")
+    say_where = "import os, sys, pytest; print(sys.prefix, os.environ.get('PEERS_MISSING'))"
+
+    first = run_with_peers(machine, "python", "-c", say_where)
+    again = run_with_peers(machine, "python", "-c", say_where)
+
+    assert first.stdout == again.stdout == f"{machine.root / '.venv-peers'} None\n"
+    assert "Virtual environment .venv-peers" in first.stderr
+    assert again.stderr == ""

@@ -22,7 +22,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 @contextlib.contextmanager
-def _alone(root: Path) -> Iterator[None]:
+def alone(root: Path) -> Iterator[None]:
     """Let one set-up at a time work on a workspace; a process that ends gives way by itself."""
     handle = os.open(str(root), os.O_RDONLY)
     try:
@@ -47,7 +47,7 @@ def set_up(root: Path, with_build: bool) -> None:
     check_location(root)
     ros = find_ros(environ, root)
     environment = PythonEnvironment(root, ros)
-    with _alone(root):
+    with alone(root):
         if not environment.is_current(requested, environ):
             check_machine(ros)
             check_build_tools(ros, environ)

@@ -134,7 +134,7 @@ class PythonEnvironment:
         pip_environ = {**environ, "PIP_USER": "0"}
         with stage(f"Python packages ({self.ros.title})") as running:
             if run_logged(command, self._log, pip_environ, running, self.root) != 0:
-                raise SetupError(self._pip_failure())
+                raise SetupError(pip_failure(self._log))
 
     def _pip_arguments(self, interpreter: Interpreter) -> list[str]:
         requirements = self.root / "requirements"
@@ -156,18 +156,20 @@ class PythonEnvironment:
             arguments += [line for line in lines if line.startswith("lanelet2")]
         return arguments
 
-    def _pip_failure(self) -> str:
-        text = self._log.read_text(encoding="utf-8", errors="replace")
-        if NO_ROOM.search(text):
-            return (
-                "The disk became full while packages were installed: make room (also where TMPDIR "
-                f"points) and run this again; see {self._log}."
-            )
-        if NO_NETWORK.search(text):
-            return (
-                "pip could not reach its package index: connect to the network, or configure pip's "
-                f"index or proxy, and run this again; see {self._log}."
-            )
-        errors = [line for line in text.splitlines() if line.startswith("ERROR:")]
-        reason = errors[-1][len("ERROR:") :].strip() if errors else "it names no reason"
-        return f"pip could not install the packages ({reason}); see {self._log}."
+
+def pip_failure(log: Path) -> str:
+    """Say in a sentence why pip failed, from what it printed."""
+    text = log.read_text(encoding="utf-8", errors="replace")
+    if NO_ROOM.search(text):
+        return (
+            "The disk became full while packages were installed: make room (also where TMPDIR "
+            f"points) and run this again; see {log}."
+        )
+    if NO_NETWORK.search(text):
+        return (
+            "pip could not reach its package index: connect to the network, or configure pip's "
+            f"index or proxy, and run this again; see {log}."
+        )
+    errors = [line for line in text.splitlines() if line.startswith("ERROR:")]
+    reason = errors[-1][len("ERROR:") :].strip() if errors else "it names no reason"
+    return f"pip could not install the packages ({reason}); see {log}."

@@ -1,8 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """The simulator as Gymnasium environments, one episode at a time or many side by side.
 
-`gymnasium.make("sim_bridge/OccludedIntersection-v0", map="four_way", scenario="base")`, and
-`gymnasium.make_vec` with `num_envs`; see registration.py.
+After `import sim_bridge.environment`:
+
+    gymnasium.make("sim_bridge/OccludedIntersection-v0", map="four_way", scenario="base")
+    gymnasium.make_vec("sim_bridge/OccludedIntersection-v0", num_envs=64, map="t_junction")
+
+examples/train_stable_baselines3.py trains on it.
 """
 
 from typing import Any

@@ -1,8 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Makes the environments known to Gymnasium, without loading them until one is made.
 
-An installed sim_bridge is found by Gymnasium itself (entry point `gymnasium.envs`); from the
-sources, call `register()` once.
+Gymnasium looks for no packages of its own accord, so the import comes first, in either form:
+
+    import sim_bridge.environment
+    gymnasium.make("sim_bridge/OccludedIntersection-v0", map="four_way", scenario="base")
+
+    gymnasium.make("sim_bridge.environment:sim_bridge/OccludedIntersection-v0", scenario="base")
+
+The second suits tools that are told an environment by its name alone.
 """
 
 import gymnasium

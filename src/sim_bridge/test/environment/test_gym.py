@@ -1,17 +1,28 @@
 # SPDX-License-Identifier: Apache-2.0
+import subprocess
+import sys
 import warnings
 
+import gymnasium
 import numpy as np
 import pytest
 
 from risk_dqn_planner.errors import ConfigurationError, ScenarioError
 from sim_bridge.environment.interface import Outcome
+from sim_bridge.environment.registration import ID
 
-gymnasium = pytest.importorskip("gymnasium")
 
-from sim_bridge.environment.registration import ID, register  # noqa: E402 (only if installed)
+def test_importing_the_environments_makes_them_known() -> None:
+    program = f"import gymnasium, sim_bridge.environment; gymnasium.spec('{ID}')"
+    found = subprocess.run(  # noqa: S603 (the program above)
+        [sys.executable, "-c", program], capture_output=True, text=True, check=False
+    )
+    assert found.returncode == 0, found.stderr
 
-register()
+
+def test_the_name_may_say_what_to_import() -> None:
+    one = gymnasium.make(f"sim_bridge.environment:{ID}", map="t_junction", scenario="base")
+    assert one.spec.id == ID
 
 
 def test_passes_gymnasiums_own_check() -> None:

@@ -39,12 +39,15 @@ class BatchEnvironment:
         reward: RewardConfig,
         risk: RiskConfig,
         run_seed: int,
+        first: int = 0,
     ) -> None:
+        """Take a simulation; `first`: number of its first environment among all of the run."""
         self._simulation = simulation
         self._encoder = encoder
         self._reward = reward
         self._risk = risk
         self._run_seed = run_seed
+        self._first = first
         self._begun = np.zeros(self.batch, dtype=np.int64)
         self._ended = np.zeros(self.batch, dtype=np.bool_)
         self._situations = simulation.situations()
@@ -103,7 +106,7 @@ class BatchEnvironment:
 
     def _begin(self, which: NDArray[np.bool_], seeds: Seeds | None = None) -> None:
         if seeds is None:
-            seeds = training_seeds(self._run_seed, self._begun)
+            seeds = training_seeds(self._run_seed, self._begun, self._first)
         self._simulation.reset(seeds, which)
         self._begun += which
 

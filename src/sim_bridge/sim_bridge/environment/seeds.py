@@ -20,21 +20,20 @@ TRAINING_SEEDS = range(2_000_000_000, 4_000_000_000)
 
 
 @kernel
-def _draw(run_seed: int, episode: Seeds, start: int, count: int, seeds: Seeds) -> None:
-    for environment in range(episode.shape[0]):
-        seeds[environment] = start + random_index(
-            np.uint64(run_seed), np.int64(environment), episode[environment], count
-        )
+def _draw(run_seed: int, first: int, episode: Seeds, start: int, count: int, seeds: Seeds) -> None:
+    for k in range(episode.shape[0]):
+        seeds[k] = start + random_index(np.uint64(run_seed), np.int64(first + k), episode[k], count)
 
 
-def training_seeds(run_seed: int, episode: Seeds) -> Seeds:
+def training_seeds(run_seed: int, episode: Seeds, first: int = 0) -> Seeds:
     """Return the next episode seed (B,) of each environment of a training run.
 
-    episode (B,): how many episodes the environment has begun. The seed depends on (run_seed,
+    episode (B,): how many episodes the environment has begun. first: number of the first one of
+    these environments among all of the run. The seed depends on (run_seed,
     environment, episode) alone, so it does not matter in which order episodes end.
     """
     seeds = np.empty_like(episode)
-    _draw(run_seed, episode, TRAINING_SEEDS.start, len(TRAINING_SEEDS), seeds)
+    _draw(run_seed, first, episode, TRAINING_SEEDS.start, len(TRAINING_SEEDS), seeds)
     return seeds
 
 

@@ -92,7 +92,7 @@ class RunFolder:
             name=name,
             state=session.state_config,
             decision_period_s=session.decision_period_s,
-            maps=(Path(self._run.map_name).stem,),
+            maps=tuple(Path(name).stem for name in self._run.map_names),
             training=outcome,
             git_revision=git_revision(),
         )

@@ -1,40 +1,59 @@
 # SPDX-License-Identifier: Apache-2.0
 """A training run from its description to its policy: builds the parts, evaluates, keeps the best.
 
+A run may take place on several maps and in several scenarios: their combinations are driven side
+by side, each by its share of the environments and of the episodes of an evaluation.
+
 Its whole state can be saved and taken over, so that an interrupted run ends in the same policy.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
+
+import numpy as np
 
 from risk_dqn_planner.risk.config import RiskConfig
 from risk_dqn_planner.state.encoding import StateConfig
 from risk_dqn_planner.state.history import StateEncoder
 from sim_bridge.environment.batch import BatchEnvironment
 from sim_bridge.environment.episodes import DrivenEpisodes, drive
-from sim_bridge.environment.interface import Outcome
+from sim_bridge.environment.interface import Environment, Outcome
 from sim_bridge.environment.place import Place
 from sim_bridge.environment.rewards import reward_named
 from sim_bridge.environment.seeds import VALIDATION_SEEDS, fixed_seeds
+from sim_bridge.environment.side_by_side import SideBySide, shares_of
 from sim_bridge.learning.config import TrainingConfig
 from sim_bridge.learning.dense import Array
 from sim_bridge.learning.greedy import GreedyPolicy
 from sim_bridge.learning.learner import Learner
 from sim_bridge.learning.trainer import Progress, Trainer
-from sim_bridge.scenarios.loading import load_scenario
+from sim_bridge.scenarios.loading import Scenario, load_scenario
 from sim_bridge.simulation.simulation import Simulation
 
 
 @dataclass(frozen=True)
 class Run:
-    """What is trained: all that decides the result, but for the map's file."""
+    """What is trained: all that decides the result, but for the maps' files.
+
+    map_name, scenario: one name, or several with commas between them.
+    """
 
     config: TrainingConfig
     reward: str
     seed: int
     map_name: str
     scenario: str
+
+    @property
+    def map_names(self) -> list[str]:
+        """The maps' names, one by one."""
+        return self.map_name.split(",")
+
+    @property
+    def scenarios(self) -> list[str]:
+        """The scenarios' names, one by one."""
+        return self.scenario.split(",")
 
 
 @dataclass(frozen=True)
@@ -48,14 +67,16 @@ class Score:
     mean_speed_mps: float
 
     @classmethod
-    def of(cls, driven: DrivenEpisodes) -> "Score":
-        """Return the score of driven episodes."""
+    def of(cls, parts: Sequence[DrivenEpisodes]) -> "Score":
+        """Return the score of driven episodes, all parts together."""
+        outcome = np.concatenate([part.outcome for part in parts])
+        speed_mps = np.concatenate([part.statistics.mean_speed_mps for part in parts])
         return cls(
-            episodes=len(driven.seed),
-            success=driven.share(Outcome.SUCCESS),
-            collision=driven.share(Outcome.COLLISION),
-            timeout=driven.share(Outcome.TIMEOUT),
-            mean_speed_mps=driven.mean_speed_mps,
+            episodes=len(outcome),
+            success=float(np.mean(outcome == Outcome.SUCCESS)),
+            collision=float(np.mean(outcome == Outcome.COLLISION)),
+            timeout=float(np.mean(outcome == Outcome.TIMEOUT)),
+            mean_speed_mps=float(speed_mps.mean()),
         )
 
     @property
@@ -90,33 +111,54 @@ class Best:
     weights: Array
 
 
+Course = tuple[Place, Scenario]
+
+
+def _simulations(courses: Sequence[Course], count: int) -> list[Simulation]:
+    """Divide so many episodes among the courses."""
+    return [
+        place.simulation(scenario, share)
+        for (place, scenario), share in zip(courses, shares_of(count, len(courses)), strict=True)
+    ]
+
+
 class Session:
     """Trains as a run describes and remembers the policy that did best on validation."""
 
-    def __init__(self, run: Run, place: Place, initial_weights: Array) -> None:
-        """Build simulator, environment and learner.
+    def __init__(self, run: Run, places: Sequence[Place], initial_weights: Array) -> None:
+        """Build simulators, environments and learner; places: the run's maps, in their order.
 
         Raises:
-            ConfigurationError, ScenarioError: the run names something that does not exist.
+            ConfigurationError, ScenarioError: the run names something that does not exist, or
+                has fewer environments or episodes than combinations of map and scenario.
         """
         self.run_description = run
         self.state_config = StateConfig()
-        scenario = load_scenario(run.scenario)
-        self.decision_period_s = scenario.timing.decision_period_s
+        courses = [(place, load_scenario(name)) for place in places for name in run.scenarios]
+        self.decision_period_s = courses[0][1].timing.decision_period_s
         evaluation = run.config.evaluation
-        environment = BatchEnvironment(
-            simulation=place.simulation(scenario, run.config.environments),
-            encoder=StateEncoder(self.state_config),
-            reward=reward_named(run.reward),
-            risk=RiskConfig(),
-            run_seed=run.seed,
-        )
+        environment = self._environment(courses)
         self._learner = Learner(run.config.learner, initial_weights)
         self._trainer = Trainer(run.config, environment, self._learner, run.seed)
-        self._evaluation = place.simulation(scenario, evaluation.episodes)
-        self._validation = place.simulation(scenario, evaluation.validation_episodes)
+        self._evaluation = _simulations(courses, evaluation.episodes)
+        self._validation = _simulations(courses, evaluation.validation_episodes)
         self.records: list[Record] = []
         self.best: Best | None = None
+
+    def _environment(self, courses: Sequence[Course]) -> Environment:
+        run = self.run_description
+        parts: list[BatchEnvironment] = []
+        for simulation in _simulations(courses, run.config.environments):
+            part = BatchEnvironment(
+                simulation=simulation,
+                encoder=StateEncoder(self.state_config),
+                reward=reward_named(run.reward),
+                risk=RiskConfig(),
+                run_seed=run.seed,
+                first=sum(part.batch for part in parts),
+            )
+            parts.append(part)
+        return SideBySide(parts) if len(parts) > 1 else parts[0]
 
     @property
     def last_weights(self) -> Array:
@@ -155,9 +197,10 @@ class Session:
             validation=validation,
         )
 
-    def _score(self, simulation: Simulation) -> Score:
+    def _score(self, simulations: Sequence[Simulation]) -> Score:
         policy = GreedyPolicy(self._learner, StateEncoder(self.state_config))
-        return Score.of(drive(simulation, policy, fixed_seeds(VALIDATION_SEEDS, simulation.batch)))
+        seeds = fixed_seeds(VALIDATION_SEEDS, max(each.batch for each in simulations))
+        return Score.of([drive(each, policy, seeds[: each.batch]) for each in simulations])
 
     def state_dict(self) -> dict[str, Any]:
         """Return everything that `load_state_dict` needs to go on identically.

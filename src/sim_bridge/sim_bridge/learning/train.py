@@ -39,10 +39,14 @@ def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
     add("--seed", type=int, default=0, help="decides every random number [%(default)s]")
     add("--steps", type=int, help="environment steps instead of the preset's")
     maps = ", ".join(map_names())
-    add("--map", default="four_way", help=f"own map ({maps}) or an .osm file [%(default)s]")
-    add("--route", help="lanelet ids, separated by commas; own maps have one")
-    add("--origin", help="latitude,longitude of the map's projection [deg]")
-    add("--scenario", default="base", help="name or .yaml file [%(default)s]")
+    add(
+        "--map",
+        default="four_way",
+        help=f"own maps ({maps}) by commas, or an .osm file [%(default)s]",
+    )
+    add("--route", help="of an .osm file: lanelet ids, separated by commas")
+    add("--origin", help="of an .osm file: latitude,longitude of its projection [deg]")
+    add("--scenario", default="base", help="names or .yaml files, by commas [%(default)s]")
     add("--name", help="name of the policy [REWARD_PRESET]")
     add("--out", type=Path, help="output folder [out/training/REWARD_PRESET_seedSEED]")
     return parser.parse_args(argv)
@@ -120,15 +124,15 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         origin = MapOrigin.from_text(arguments.origin) if arguments.origin else None
         route = None if arguments.route is None else parse_route(arguments.route)
-        place = load_place(arguments.map, route, origin)
         run = Run(
             _config(arguments), arguments.reward, arguments.seed, arguments.map, arguments.scenario
         )
+        places = [load_place(name, route, origin) for name in run.map_names]
         folder = RunFolder(out, run)
         if folder.finished:
             console.print(f"{out} is trained already; delete it to train again")
             return 0
-        session = Session(run, place, initial_weights(arguments.seed))
+        session = Session(run, places, initial_weights(arguments.seed))
         if folder.resume(session):
             console.print(f"resuming {out} at {session.progress:.0%}")
         _train(session, folder, console)

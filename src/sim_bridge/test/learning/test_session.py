@@ -31,7 +31,7 @@ TINY = Run(
         replay=ReplayConfig(capacity=300),
         learner=LearnerConfig(learning_rate=1e-3),
         evaluation=EvaluationConfig(
-            every_episodes=4, episodes=3, validation_every=2, validation_episodes=5
+            every_episodes=4, episodes=4, validation_every=2, validation_episodes=5
         ),
     ),
     reward="risk_with_occlusions",
@@ -47,7 +47,7 @@ def place() -> Place:
 
 
 def session(run: Run = TINY) -> Session:
-    return Session(run, place(), initial_weights(run.seed))
+    return Session(run, [place()], initial_weights(run.seed))
 
 
 def test_interrupted_run_resumes_to_the_bit_identical_result(tmp_path: Path) -> None:
@@ -73,6 +73,27 @@ def test_another_seed_gives_another_result() -> None:
     list(first.run())
     list(second.run())
     assert not np.array_equal(first.last_weights, second.last_weights)
+
+
+def test_a_run_on_maps_and_scenarios_resumes_to_the_identical_result(tmp_path: Path) -> None:
+    both = replace(TINY, map_name="four_way,t_junction", scenario="base,dense_traffic")
+    places = [place(), load_place("t_junction")]
+    whole, begun, resumed = (Session(both, places, initial_weights(3)) for _ in range(3))
+    list(whole.run())
+    next(begun.run())
+    RunFolder(tmp_path, both).save(begun)
+    assert RunFolder(tmp_path, both).resume(resumed)
+    list(resumed.run())
+    np.testing.assert_array_equal(resumed.last_weights, whole.last_weights)
+    assert resumed.records == whole.records
+    assert whole.records[-1].validation is not None
+    assert whole.records[-1].validation.episodes == TINY.config.evaluation.validation_episodes
+
+
+def test_a_run_needs_an_environment_for_each_map_and_scenario() -> None:
+    names = ",".join(["base"] * 5)
+    with pytest.raises(ConfigurationError, match=r"4 environments .* 5 combinations"):
+        session(replace(TINY, scenario=names))
 
 
 def test_validation_comes_every_second_report_and_at_the_end() -> None:
@@ -110,7 +131,7 @@ def test_exported_policy_drives_as_validation_said(tmp_path: Path) -> None:
     simulation = place().simulation(load_scenario("base"), 5)
     driven = drive(simulation, policy, fixed_seeds(VALIDATION_SEEDS, 5))
     assert one.best is not None
-    assert Score.of(driven) == one.best.score
+    assert Score.of([driven]) == one.best.score
     result = json.loads((tmp_path / "result.json").read_text())
     assert result["sha256"] == file.sha256
     assert file.contract["training"]["run"]["seed"] == TINY.seed

@@ -8,7 +8,7 @@ import numpy as np
 
 from risk_dqn_planner.compiled import kernel
 from risk_dqn_planner.situation.situations import Booleans, Floats, Integers, Situations
-from sim_bridge.perception.visibility import HALF_PLANES, cast_shadows, first_hidden, point_hidden
+from sim_bridge.perception.visibility import HALF_PLANES, cast_shadows, first_hidden, hide_points
 from sim_bridge.simulation.randomness import NOISE_STREAM, random_normal
 from sim_bridge.simulation.settings import Settings
 from sim_bridge.simulation.state import Episodes, Vehicles
@@ -153,16 +153,19 @@ def see_vehicles(
     seed, tick, ids = episodes.seed, episodes.tick, vehicles.id
     x_m, y_m, shadows, cast = view.x_m, view.y_m, view.shadows, view.cast
     range_m, noise_mps = settings.sensor_range_m, settings.velocity_noise_mps
+    count = driving.shape[1]
+    x, y, depth = np.empty(count), np.empty(count), np.empty(count)
     for b in range(driving.shape[0]):
-        for i in range(driving.shape[1]):
-            seen[b, i] = False
-            if not driving[b, i]:
-                continue
-            x, y, _ = table_pose(table, path[b, i], s_m[b, i])
-            seen[b, i] = not point_hidden(x, y, x_m[b], y_m[b], range_m, shadows, b, cast[b])
-            measured_mps[b, i] = measured_speed(
-                speed_mps[b, i], noise_mps, seed[b], tick[b], ids[b, i]
-            )
+        # Empty places hold a path too, so that nothing need be asked here.
+        for i in range(count):
+            x[i], y[i], _ = table_pose(table, path[b, i], s_m[b, i])
+        hide_points(x, y, x_m[b], y_m[b], range_m, shadows, b, cast[b], depth)
+        for i in range(count):
+            seen[b, i] = driving[b, i] & (depth[i] <= 0.0)
+            if driving[b, i]:
+                measured_mps[b, i] = measured_speed(
+                    speed_mps[b, i], noise_mps, seed[b], tick[b], ids[b, i]
+                )
 
 
 @kernel

@@ -15,6 +15,8 @@ from risk_dqn_planner.compiled import kernel
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
+Plane = tuple[float, float, float]
+Planes = tuple[Plane, Plane, Plane, Plane]
 
 HALF_PLANES = 4
 
@@ -96,16 +98,54 @@ def cast_shadows(
 
 
 @kernel
-def _sides(
-    shadows: Floats, b: int, o: int, x: float, y: float
-) -> tuple[float, float, float, float]:
-    """Return how far inside of each half-plane of a shadow a point is, in lengths of the normal."""
+def _planes(shadows: Floats, b: int, o: int) -> Planes:
+    """Return the four half-planes of shadow (b, o), so that they are read once for many points."""
     return (
-        shadows[b, o, 0, 0] * x + shadows[b, o, 0, 1] * y - shadows[b, o, 0, 2],
-        shadows[b, o, 1, 0] * x + shadows[b, o, 1, 1] * y - shadows[b, o, 1, 2],
-        shadows[b, o, 2, 0] * x + shadows[b, o, 2, 1] * y - shadows[b, o, 2, 2],
-        shadows[b, o, 3, 0] * x + shadows[b, o, 3, 1] * y - shadows[b, o, 3, 2],
+        (shadows[b, o, 0, 0], shadows[b, o, 0, 1], shadows[b, o, 0, 2]),
+        (shadows[b, o, 1, 0], shadows[b, o, 1, 1], shadows[b, o, 1, 2]),
+        (shadows[b, o, 2, 0], shadows[b, o, 2, 1], shadows[b, o, 2, 2]),
+        (shadows[b, o, 3, 0], shadows[b, o, 3, 1], shadows[b, o, 3, 2]),
     )
+
+
+@kernel
+def _sides(planes: Planes, x: float, y: float) -> tuple[float, float, float, float]:
+    """Return how far inside of each half-plane of a shadow a point is, in lengths of the normal."""
+    p, q, r, s = planes
+    return (
+        p[0] * x + p[1] * y - p[2],
+        q[0] * x + q[1] * y - q[2],
+        r[0] * x + r[1] * y - r[2],
+        s[0] * x + s[1] * y - s[2],
+    )
+
+
+@kernel
+def hide_points(
+    x: Floats,
+    y: Floats,
+    sensor_x: float,
+    sensor_y: float,
+    range_m: float,
+    shadows: Floats,
+    b: int,
+    count: int,
+    depth: Floats,
+) -> None:
+    """Fill `depth` (N,) with more than 0 where points (N,) are out of range or in a shadow.
+
+    The shadows are the first `count` of b in (B, O, 4, 3); their edges are still visible. All
+    points at one shadow, and no branches, so that it runs in vector registers.
+    """
+    for i in range(len(x)):
+        dx, dy = x[i] - sensor_x, y[i] - sensor_y
+        depth[i] = 1.0 if dx * dx + dy * dy > range_m * range_m else -1.0
+    for o in range(count):
+        planes = _planes(shadows, b, o)
+        for i in range(len(x)):
+            inside = _sides(planes, x[i], y[i])
+            within = min(inside[0], inside[1], inside[2], inside[3])
+            depth[i] = max(depth[i], within)
 
 
 @kernel
@@ -119,17 +159,10 @@ def point_hidden(
     b: int,
     count: int,
 ) -> bool:
-    """Tell whether a point is out of range or in one of `count` shadows b of (B, O, 4, 3).
-
-    The edge of a shadow is still visible.
-    """
-    dx, dy = x - sensor_x, y - sensor_y
-    hidden = dx * dx + dy * dy > range_m * range_m
-    for o in range(count):
-        inside = _sides(shadows, b, o, x, y)
-        # Without branches, which a processor could not foresee.
-        hidden |= (inside[0] > 0.0) & (inside[1] > 0.0) & (inside[2] > 0.0) & (inside[3] > 0.0)
-    return hidden
+    """Tell of one point what `hide_points` tells of many."""
+    one_x, one_y, depth = np.full(1, x), np.full(1, y), np.empty(1)
+    hide_points(one_x, one_y, sensor_x, sensor_y, range_m, shadows, b, count, depth)
+    return bool(depth[0] > 0.0)
 
 
 @kernel
@@ -162,9 +195,10 @@ def first_in_shadow(
 
     Cyrus and Beck 1978, segment by segment. A way that only touches the shadow does not enter it.
     """
-    a = _sides(shadows, b, o, xy[p, 0, 0], xy[p, 0, 1])
+    planes = _planes(shadows, b, o)
+    a = _sides(planes, xy[p, 0, 0], xy[p, 0, 1])
     for k in range(1, points):
-        z = _sides(shadows, b, o, xy[p, k, 0], xy[p, k, 1])
+        z = _sides(planes, xy[p, k, 0], xy[p, k, 1])
         # Both ends outside of one half-plane: no point of the segment is in the shadow.
         apart = (max(a[0], z[0]) <= 0.0) | (max(a[1], z[1]) <= 0.0)
         apart |= (max(a[2], z[2]) <= 0.0) | (max(a[3], z[3]) <= 0.0)

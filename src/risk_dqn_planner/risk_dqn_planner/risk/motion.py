@@ -68,3 +68,29 @@ def distance_after(
         return (speed_mps + 0.5 * rate_mps2 * time_s) * time_s
     ramp_s = change_mps / rate_mps2
     return 0.5 * (speed_mps + target_mps) * ramp_s + target_mps * (time_s - ramp_s)
+
+
+@elementwise
+def time_to_travel(
+    distance_m: float,
+    speed_mps: float,
+    target_mps: float,
+    acceleration_mps2: float,
+    braking_mps2: float,
+) -> float:
+    """Return when `distance_m` is covered while approaching a target speed and then keeping it.
+
+    The inverse of `distance_after`: infinity where the motion comes to rest before.
+    """
+    if distance_m <= 0.0:
+        return 0.0
+    if speed_mps < target_mps:
+        time_s: float = time_to_cover(distance_m, speed_mps, acceleration_mps2, target_mps)
+        return time_s
+    ramp_m = 0.5 * (speed_mps * speed_mps - target_mps * target_mps) / braking_mps2
+    if distance_m <= ramp_m:
+        speed_at_end = math.sqrt(speed_mps * speed_mps - 2.0 * braking_mps2 * distance_m)
+        return 2.0 * distance_m / (speed_mps + speed_at_end)
+    if target_mps <= 0.0:
+        return math.inf
+    return (speed_mps - target_mps) / braking_mps2 + (distance_m - ramp_m) / target_mps

@@ -1,0 +1,226 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which actions are sound: one manoeuvre after them is safe against everyone at once (SPEC 4).
+
+The paper asks for each vehicle apart whether the ego can stop before it *or* leave before it.
+With adjacent lanes both may hold for different vehicles while no motion does both. Here an action
+is admissible if the ego, having followed it for one decision period, has *one* manoeuvre left
+(brake to rest, or go; or go for a while and then rest) that is safe against the real and virtual
+vehicles of all lanes. What it does during the action itself counts as well.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from risk_dqn_planner.compiled import kernel
+from risk_dqn_planner.safety.assumptions import SafetyAssumptions, SafetyNumbers
+from risk_dqn_planner.safety.course import (
+    BRAKE,
+    GO,
+    Course,
+    begin_course,
+    time_at,
+    with_manoeuvre,
+)
+from risk_dqn_planner.safety.merging import merging_margin
+from risk_dqn_planner.safety.others import NOTHING, earliest_arrival
+from risk_dqn_planner.situation.situations import Booleans, Floats, Integers, Situations
+
+ACTIONS = 3
+NO_MANOEUVRE = -1
+# Going for longer than this before coming to rest is not looked at.
+_MOST_PERIODS = 16
+# A manoeuvre that is safe by nothing must not fail by rounding when it is looked at again.
+_ROUNDING = 1e-6
+
+
+class JointCheck(NamedTuple):
+    """What the check says of B situations and the three actions, columns as in Action, (B, 3).
+
+    admissible; periods: the manoeuvre that vindicates the action, as the number of decision
+    periods of going before the ego brakes to rest: 0 is BRAKE, GO for ever; -1 none.
+    margin_s: time left of the vindicating manoeuvre, or (negative) missing in the best one; room
+    counts as the time that the ego takes for it at fast speed; infinity where nobody matters.
+    critical_vehicle: index of who has that margin, -1 a hidden vehicle or nobody; critical_lane:
+    index of its lane, -1 nobody.
+    """
+
+    admissible: Booleans
+    periods: Integers
+    margin_s: Floats
+    critical_vehicle: Integers
+    critical_lane: Integers
+
+
+class Verdict(NamedTuple):
+    """The margin of one course, and whose it is."""
+
+    margin_s: float
+    vehicle: int
+    lane: int
+
+
+def joint_check(
+    situations: Situations,
+    assumptions: SafetyAssumptions,
+    in_force: NDArray[np.int64] | None = None,
+    reacted_m: Floats | None = None,
+) -> JointCheck:
+    """Return for each situation which actions are admissible, and why.
+
+    in_force (B,): the action before, carried on during the actuation delay; Stop by default.
+    reacted_m (B, M): vehicles of merging lanes no further from their zone's centre than this have
+    had the ego in their lane, and in sight, for the reaction time; nobody has by default.
+    """
+    batch, lanes = situations.lane_mask.shape
+    shape = (batch, ACTIONS)
+    result = JointCheck(
+        np.zeros(shape, dtype=np.bool_),
+        np.full(shape, NO_MANOEUVRE),
+        np.full(shape, np.inf),
+        np.full(shape, NOTHING),
+        np.full(shape, NOTHING),
+    )
+    check_into(
+        situations,
+        assumptions.numbers(),
+        np.zeros(batch, dtype=np.int64) if in_force is None else in_force,
+        np.full((batch, lanes), -np.inf) if reacted_m is None else reacted_m,
+        result,
+    )
+    return result
+
+
+@kernel
+def check_into(
+    s: Situations,
+    p: SafetyNumbers,
+    in_force: Integers,
+    reacted_m: Floats,
+    result: JointCheck,
+) -> None:
+    """Fill `result` row by row."""
+    lanes = s.lane_mask.shape[1]
+    arrival_s, who = np.empty(lanes), np.empty(lanes, dtype=np.int64)
+    for row in range(s.ego_speed_mps.shape[0]):
+        last_m, merging = foresee(s, row, p, arrival_s, who)
+        for action in range(ACTIONS):
+            course = begin_course(
+                max(s.ego_speed_mps[row], 0.0),
+                target_of(in_force[row], p),
+                target_of(action, p),
+                p,
+            )
+            periods, verdict = vindicate(
+                s, row, course, arrival_s, who, reacted_m, last_m, merging, p
+            )
+            result.admissible[row, action] = periods != NO_MANOEUVRE
+            result.periods[row, action] = periods
+            result.margin_s[row, action] = verdict.margin_s
+            result.critical_vehicle[row, action] = verdict.vehicle
+            result.critical_lane[row, action] = verdict.lane
+
+
+@kernel
+def target_of(action: int, p: SafetyNumbers) -> float:
+    """Return the speed that an action heads for."""
+    if action == 0:
+        return 0.0
+    return p.slow_mps if action == 1 else p.fast_mps
+
+
+@kernel
+def foresee(
+    s: Situations, row: int, p: SafetyNumbers, arrival_s: Floats, who: Integers
+) -> tuple[float, bool]:
+    """Fill when anyone may be in each crossing zone (M,), and who.
+
+    Returns the way to the end of the last zone, and whether a merging lane matters.
+    """
+    last_m, merging = 0.0, False
+    for lane in range(s.lane_mask.shape[1]):
+        if not s.lane_mask[row, lane]:
+            continue
+        end_m = s.lane_ego_distance_m[row, lane] + 0.5 * s.lane_ego_zone_m[row, lane]
+        last_m = max(last_m, end_m + p.zone_margin_m)
+        if s.lane_merging[row, lane]:
+            merging = True
+        else:
+            arrival_s[lane], who[lane] = earliest_arrival(s, row, lane, p)
+    return last_m, merging
+
+
+@kernel
+def vindicate(
+    s: Situations,
+    row: int,
+    course: Course,
+    arrival_s: Floats,
+    who: Integers,
+    reacted_m: Floats,
+    last_m: float,
+    merging: bool,
+    p: SafetyNumbers,
+) -> tuple[int, Verdict]:
+    """Return the manoeuvre that makes a course safe, -1 for none, and the verdict on it.
+
+    Without one, the verdict is that of the best of braking and going.
+    """
+    braking = with_manoeuvre(course, BRAKE, p)
+    verdict = judge(s, row, braking, arrival_s, who, reacted_m, p)
+    if verdict.margin_s >= -_ROUNDING:
+        return BRAKE, verdict
+    going = judge(s, row, course, arrival_s, who, reacted_m, p)
+    if going.margin_s >= -_ROUNDING:
+        return GO, going
+    best = going if going.margin_s > verdict.margin_s else verdict
+    for periods in range(1, _MOST_PERIODS + 1):
+        stopping = with_manoeuvre(course, periods, p)
+        # Behind all zones it is of use only where going on for ever fails, behind a leader.
+        if stopping.rest_m > last_m and not merging:
+            break
+        verdict = judge(s, row, stopping, arrival_s, who, reacted_m, p)
+        if verdict.margin_s >= -_ROUNDING:
+            return periods, verdict
+        if stopping.rest_m > last_m:
+            break
+    return NO_MANOEUVRE, best
+
+
+@kernel
+def judge(
+    s: Situations,
+    row: int,
+    c: Course,
+    arrival_s: Floats,
+    who: Integers,
+    reacted_m: Floats,
+    p: SafetyNumbers,
+) -> Verdict:
+    """Return the least margin of a course over all lanes."""
+    least = Verdict(math.inf, NOTHING, NOTHING)
+    for lane in range(s.lane_mask.shape[1]):
+        if not s.lane_mask[row, lane]:
+            continue
+        half_m = 0.5 * s.lane_ego_zone_m[row, lane]
+        start_m = s.lane_ego_distance_m[row, lane] - half_m
+        end_m = s.lane_ego_distance_m[row, lane] + half_m
+        if c.rest_m <= start_m - p.zone_margin_m + _ROUNDING:
+            continue
+        if s.lane_merging[row, lane]:
+            # At rest before the zone, but not far enough, is no place to be.
+            margin_s, vehicle = -math.inf, NOTHING
+            if c.rest_m > start_m:
+                room_m, vehicle = merging_margin(s, row, lane, reacted_m, c, p, start_m)
+                margin_s = room_m / p.fast_mps
+        elif end_m <= 0.0 or arrival_s[lane] == math.inf:
+            continue
+        else:
+            margin_s, vehicle = -math.inf, who[lane]
+            if c.rest_m >= end_m + p.zone_margin_m:
+                margin_s = arrival_s[lane] - time_at(c, end_m, p) - p.safe_gap_s
+        if margin_s < least.margin_s:
+            least = Verdict(margin_s, vehicle, lane)
+    return least

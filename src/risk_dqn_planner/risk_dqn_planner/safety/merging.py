@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Merging lanes, where nobody leaves: whom the ego may have before it and behind it (kernels).
+
+All places are on the path that is common behind the join, relative to the ego's centre now:
+positive ahead. A lane's vehicle is no danger if the ego stays before the zone, if it is a leader
+behind which the ego comes to rest, or if it is a follower that has room to react.
+"""
+
+import math
+
+from risk_dqn_planner.compiled import kernel
+from risk_dqn_planner.risk.rewards import leader_gap
+from risk_dqn_planner.safety.assumptions import SafetyNumbers
+from risk_dqn_planner.safety.course import Course, speed_at, time_at, way_at
+from risk_dqn_planner.safety.others import advance, hidden_speed, start_speed, top_speed
+from risk_dqn_planner.situation.situations import Floats, Situations
+
+
+@kernel
+def leader_margin(c: Course, ahead_m: float, mps: float, p: SafetyNumbers) -> float:
+    """Return the room that remains when both have come to rest; minus infinity for no leader.
+
+    The leader brakes from now on, at least as hard as the ego ever does. So its lead in speed only
+    ever shrinks, and the room is least now or at rest.
+    """
+    needed_m = p.between_centres_m + p.clearance_m
+    if ahead_m - needed_m < 0.0:
+        return -math.inf
+    return ahead_m + 0.5 * mps * mps / p.leader_down_mps2 - needed_m - c.rest_m
+
+
+@kernel
+def follower_margin(
+    c: Course,
+    ahead_m: float,
+    mps: float,
+    top_mps: float,
+    enter_s: float,
+    reaction_s: float,
+    gap_m: float,
+    p: SafetyNumbers,
+) -> float:
+    """Return the room that remains, beyond `gap_m`, between the ego and a follower.
+
+    The follower accelerates until `reaction_s` after the ego's entering and brakes from then on.
+    It must have the gap when the ego enters, when it begins to brake, and at rest if the ego
+    rests; and while the ego does not slow down, braking to the ego's speed must suffice, without
+    counting on the ego to become faster: by then it follows the ego like any leader.
+    """
+    room_m = -ahead_m - p.between_centres_m - gap_m
+    way_m, _ = advance(mps, top_mps, enter_s, p)
+    margin_m = room_m + way_at(c, enter_s, p) - way_m
+    react_s = enter_s + reaction_s
+    way_m, speed_mps = advance(mps, top_mps, react_s, p)
+    margin_m = min(margin_m, room_m + way_at(c, react_s, p) - way_m)
+    down = p.follower_down_mps2
+    if c.rest_m < math.inf:
+        margin_m = min(margin_m, room_m + c.rest_m - way_m - 0.5 * speed_mps * speed_mps / down)
+    settled_s = max(react_s, c.slowing_until_s)
+    if settled_s < c.t3:
+        braking_s = min(settled_s - react_s, speed_mps / down)
+        way_m += (speed_mps - 0.5 * down * braking_s) * braking_s
+        speed_mps -= down * braking_s
+        margin_m = min(margin_m, room_m + way_at(c, settled_s, p) - way_m)
+        closing_mps = max(speed_mps - speed_at(c, settled_s, p), 0.0)
+        needed_m = 0.5 * closing_mps * closing_mps / down
+        margin_m = min(margin_m, room_m + way_at(c, settled_s, p) - way_m - needed_m)
+    return margin_m
+
+
+@kernel
+def merging_margin(
+    s: Situations,
+    row: int,
+    lane: int,
+    reacted_m: Floats,
+    c: Course,
+    p: SafetyNumbers,
+    start_m: float,
+) -> tuple[float, int]:
+    """Return the least room of a merging lane [m] and whose it is, -1 for a hidden vehicle.
+
+    For an ego that enters the zone after `start_m`. reacted_m (B, M): see `joint_check`.
+    """
+    enter_s = time_at(c, start_m, p)
+    least_m, who = hidden_margin(s, row, lane, c, enter_s, p), -1
+    for vehicle in range(s.vehicle_mask.shape[1]):
+        if not s.vehicle_mask[row, vehicle] or s.vehicle_lane[row, vehicle] != lane:
+            continue
+        now_m = s.vehicle_distance_m[row, vehicle]
+        ahead_m = leader_gap(
+            s.lane_ego_distance_m[row, lane],
+            s.lane_ego_zone_m[row, lane],
+            now_m,
+            s.lane_zone_m[row, lane],
+        )
+        slow_mps = max(s.vehicle_speed_mps[row, vehicle] - p.speed_error_mps, 0.0)
+        margin_m = leader_margin(c, ahead_m - p.position_error_m, slow_mps, p)
+        mps = start_speed(s, row, vehicle, p)
+        reaction_s, gap_m = p.reaction_s, p.follower_gap_m
+        if now_m + p.position_error_m <= reacted_m[row, lane]:
+            reaction_s, gap_m = 0.0, p.clearance_m
+        top_mps = top_speed(s, row, lane, mps, p)
+        behind_m = follower_margin(
+            c, ahead_m + p.position_error_m, mps, top_mps, enter_s, reaction_s, gap_m, p
+        )
+        margin_m = max(margin_m, behind_m)
+        if margin_m < least_m:
+            least_m, who = margin_m, vehicle
+    return least_m, who
+
+
+@kernel
+def hidden_margin(
+    s: Situations, row: int, lane: int, c: Course, enter_s: float, p: SafetyNumbers
+) -> float:
+    """Return the room of what may hide on a merging lane: a follower that has not seen the ego.
+
+    It comes into sight at once, so it reacts to the ego's entering, or to what it then sees.
+    """
+    ahead_m = leader_gap(
+        s.lane_ego_distance_m[row, lane],
+        s.lane_ego_zone_m[row, lane],
+        s.lane_hidden_distance_m[row, lane],
+        s.lane_zone_m[row, lane],
+    )
+    mps = hidden_speed(s, row, lane, p)
+    return follower_margin(c, ahead_m, mps, mps, enter_s, p.reaction_s, p.follower_gap_m, p)

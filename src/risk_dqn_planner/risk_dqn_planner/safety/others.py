@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What others may do at worst, whatever the ego does (kernels).
+
+Crossing lanes: from its earliest arrival on a vehicle may be in its zone for ever, so a lane is
+one number, the earliest arrival of anyone. A vehicle is gone only if it has already left; the one
+that may hide at d_o never is.
+"""
+
+import math
+
+from risk_dqn_planner.compiled import kernel
+from risk_dqn_planner.risk.motion import distance_after, speed_after
+from risk_dqn_planner.risk.rewards import reach_time
+from risk_dqn_planner.safety.assumptions import SafetyNumbers
+from risk_dqn_planner.situation.situations import Situations
+
+NOTHING = -1
+
+
+@kernel
+def start_speed(s: Situations, row: int, vehicle: int, p: SafetyNumbers) -> float:
+    """Return the highest speed that a perceived vehicle may have now; nobody drives backwards."""
+    return max(float(s.vehicle_speed_mps[row, vehicle]) + p.speed_error_mps, 0.0)
+
+
+@kernel
+def top_speed(s: Situations, row: int, lane: int, start_mps: float, p: SafetyNumbers) -> float:
+    """Return the highest speed that a perceived vehicle may reach on its lane."""
+    return max(start_mps, float(s.lane_speed_limit_mps[row, lane]) * p.limit_factor)
+
+
+@kernel
+def hidden_speed(s: Situations, row: int, lane: int, p: SafetyNumbers) -> float:
+    """Return the speed of whatever may hide on a lane."""
+    return min(float(s.lane_speed_limit_mps[row, lane]) * p.limit_factor, p.hidden_top_mps)
+
+
+@kernel
+def hidden_arrival(s: Situations, row: int, lane: int, p: SafetyNumbers) -> float:
+    """Return when the vehicle that may hide at d_o reaches its zone; 0 if it may be there."""
+    mps = hidden_speed(s, row, lane, p)
+    arrival_s: float = reach_time(
+        s.lane_hidden_distance_m[row, lane], s.lane_zone_m[row, lane], mps, p.others_up_mps2, mps
+    )
+    return arrival_s
+
+
+@kernel
+def vehicle_arrival(s: Situations, row: int, vehicle: int, lane: int, p: SafetyNumbers) -> float:
+    """Return when a perceived vehicle may reach its zone at the earliest, infinity once it left."""
+    zone_m, now_m = s.lane_zone_m[row, lane], s.vehicle_distance_m[row, vehicle]
+    if now_m + 0.5 * zone_m <= -p.position_error_m:
+        return math.inf
+    mps = start_speed(s, row, vehicle, p)
+    arrival_s: float = reach_time(
+        now_m - p.position_error_m, zone_m, mps, p.others_up_mps2, top_speed(s, row, lane, mps, p)
+    )
+    return arrival_s
+
+
+@kernel
+def earliest_arrival(s: Situations, row: int, lane: int, p: SafetyNumbers) -> tuple[float, int]:
+    """Return when anyone may reach a lane's zone, and the vehicle's index, -1 for a hidden one.
+
+    Of vehicles that may arrive at the same time the one with the lower id is named.
+    """
+    first_s, first = hidden_arrival(s, row, lane, p), NOTHING
+    for vehicle in range(s.vehicle_mask.shape[1]):
+        if not s.vehicle_mask[row, vehicle] or s.vehicle_lane[row, vehicle] != lane:
+            continue
+        arrival_s = vehicle_arrival(s, row, vehicle, lane, p)
+        if arrival_s < first_s or (
+            arrival_s == first_s < math.inf
+            and (first == NOTHING or s.vehicle_id[row, vehicle] < s.vehicle_id[row, first])
+        ):
+            first_s, first = arrival_s, vehicle
+    return first_s, first
+
+
+@kernel
+def advance(
+    start_mps: float, top_mps: float, until_s: float, p: SafetyNumbers
+) -> tuple[float, float]:
+    """Return way and speed of someone who accelerates as hard as possible until a time."""
+    way_m: float = distance_after(until_s, start_mps, top_mps, p.others_up_mps2, 0.0)
+    mps: float = speed_after(until_s, start_mps, top_mps, p.others_up_mps2, 0.0)
+    return way_m, mps

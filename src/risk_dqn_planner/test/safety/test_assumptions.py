@@ -1,0 +1,39 @@
+# SPDX-License-Identifier: Apache-2.0
+import dataclasses
+import math
+from typing import Any
+
+import pytest
+
+from risk_dqn_planner.errors import ConfigurationError
+from risk_dqn_planner.safety.assumptions import SafetyAssumptions
+
+
+def test_every_parameter_says_what_it_is_and_its_default_lies_within_its_bounds() -> None:
+    for field in dataclasses.fields(SafetyAssumptions):
+        if field.default is dataclasses.MISSING:
+            continue
+        assert field.metadata["description"].endswith("]") or field.name == "speed_limit_factor"
+        assert field.metadata["minimum"] <= field.default <= field.metadata["maximum"]
+
+
+def test_every_number_reaches_the_kernels() -> None:
+    plain = SafetyAssumptions()
+    for field in dataclasses.fields(SafetyAssumptions):
+        if field.default is not dataclasses.MISSING:
+            changed = dataclasses.replace(plain, **{field.name: field.default + 0.25})
+            assert changed.numbers() != plain.numbers(), field.name
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [{"decision_period_s": 0.0}, {"safe_gap_s": -0.1}, {"speed_error_mps": math.nan}],
+)
+def test_values_out_of_bounds_are_refused(changes: dict[str, Any]) -> None:
+    with pytest.raises(ConfigurationError, match=next(iter(changes))):
+        SafetyAssumptions(**changes)
+
+
+def test_leaders_must_be_able_to_brake_as_hard_as_the_ego() -> None:
+    with pytest.raises(ConfigurationError, match=r"leader_braking_mps2 is 3\.0.*3\.5"):
+        SafetyAssumptions(leader_braking_mps2=3.0)

@@ -16,8 +16,9 @@ BOOTSTRAP := $(HOST_PYTHON) tools/bootstrap.py
 WITH_TOOLS := $(BOOTSTRAP) --no-build --
 WITH_ROS := $(BOOTSTRAP) --
 SIMULATION := install/sim_bridge/lib/sim_bridge
-PYTHON_SOURCES := src/risk_dqn_planner src/sim_bridge tests tools
-TYPED_SOURCES := src/risk_dqn_planner/risk_dqn_planner src/sim_bridge/sim_bridge tools
+PYTHON_SOURCES := src/risk_dqn_planner src/sim_bridge tests tools bench examples
+TYPED_SOURCES := src/risk_dqn_planner/risk_dqn_planner src/sim_bridge/sim_bridge tools bench \
+  examples
 
 # --option='value' for a variable given on the command line of make, nothing otherwise: a variable
 # of that name in the user's environment means something else.
@@ -27,7 +28,13 @@ RUN_OPTIONS = $(call option,--map,MAP) $(call option,--route,ROUTE) $(call optio
   $(call option,--scenario,SCENARIO) $(call option,--episodes,EPISODES) $(call option,--seed,SEED) \
   $(call option,--rate,RATE) $(call option,--out,OUT)
 
-.PHONY: help setup demo test replay bags maps train evaluate ship bench shell format lint types check clean distclean
+# How the shipped policies are trained; `evaluate` takes all seeds in out/training of each.
+SEEDS := 0 1 2
+RISK_AWARE_PAPER := --preset paper --reward risk --name risk_aware_paper
+COLLISION_AWARE_PAPER := --preset paper --reward collision --name collision_aware_paper
+TUNED := --preset tuned --reward risk --name tuned
+
+.PHONY: help setup demo test replay bags maps train trainings evaluate ship bench shell format lint types check clean distclean
 
 help: ## list the targets
 	@echo 'make TARGET, where TARGET is one of'
@@ -58,18 +65,24 @@ train: ## train a DQN, or go on with it [PRESET REWARD SEED STEPS MAP ROUTE ORIG
 	  $(call option,--route,ROUTE) $(call option,--origin,ORIGIN) \
 	  $(call option,--scenario,SCENARIO) $(call option,--name,NAME) $(call option,--out,OUT) $(ARGS)
 
-evaluate: ## drive policies through the paper's cells [EPISODES POLICIES SCENARIOS MAP ROUTE ORIGIN]
+trainings: ## train all policies of the evaluation, one after another [SEEDS='0 1 2']
+	@$(WITH_ROS) bash -c 'for seed in $(SEEDS); do \
+	  $(SIMULATION)/train $(RISK_AWARE_PAPER) --seed $$seed || exit; \
+	  $(SIMULATION)/train $(COLLISION_AWARE_PAPER) --seed $$seed || exit; \
+	  $(SIMULATION)/train $(TUNED) --seed $$seed || exit; done'
+
+evaluate: ## drive policies through the paper's cells [EPISODES POLICIES SCENARIOS MAP ROUTE ORIGIN REPORT]
 	@$(WITH_ROS) $(SIMULATION)/evaluate $(call option,--episodes,EPISODES) \
 	  $(call option,--policies,POLICIES) $(call option,--scenarios,SCENARIOS) \
-	  $(call option,--map,MAP) $(call option,--route,ROUTE) $(call option,--origin,ORIGIN) $(ARGS)
+	  $(call option,--map,MAP) $(call option,--route,ROUTE) $(call option,--origin,ORIGIN) \
+	  $(call option,--report,REPORT) $(ARGS)
 
 ship: ## ship a trained run, without RUN only write the cards [RUN=out/training/... NAME RESULTS]
 	@$(WITH_ROS) $(SIMULATION)/ship $(call option,--run,RUN) $(call option,--name,NAME) \
 	  $(call option,--results,RESULTS) $(ARGS)
 
-bench: ## run the benchmarks
-	@$(WITH_ROS) bash -c 'for script in src/*/benchmarks/bench_*.py; do \
-	  echo "== $$script"; python "$$script" $(ARGS) || exit; done'
+bench: ## measure all beside highway-env, libsumo and stable-baselines3 [ARGS='--quick']
+	@$(WITH_ROS) python tools/peers.py -- python -m bench $(ARGS)
 
 shell: ## open a shell in which the nodes run [ARGS="-c 'command'"]
 	@$(WITH_ROS) bash --rcfile tools/shell.bashrc $(ARGS)
@@ -89,7 +102,7 @@ check: lint types test ## lint, types and test
 
 clean: ## remove what was built, recorded and cached, except .venv
 	rm -rf build install log out .hypothesis .mypy_cache .pytest_cache .ruff_cache
-	find src tests tools -name __pycache__ -type d -prune -exec rm -rf {} +
+	find src tests tools bench examples -name __pycache__ -type d -prune -exec rm -rf {} +
 
-distclean: clean ## remove .venv too
-	rm -rf .venv
+distclean: clean ## remove .venv and .venv-peers too
+	rm -rf .venv .venv-peers

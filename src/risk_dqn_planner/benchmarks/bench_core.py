@@ -7,7 +7,7 @@ compile) do not.
 
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -66,10 +66,9 @@ def microseconds(work: Callable[[Situations], object], scenes: list[Situations])
     return best_s / (repeats * len(scenes) * batch) * 1e6
 
 
-def main() -> None:
-    """Print a table of all measurements."""
-    sys.stdout.write(f"{'us per situation':<24}{'batch 1':>12}{'batch 1024':>12}\n")
-    scenes = {batch: drive(batch) for batch in (1, 1024)}
+def measure(batches: Sequence[int] = (1, 1024)) -> dict[str, dict[str, float]]:
+    """Return the microseconds a situation of each part, by batch size."""
+    scenes = {batch: drive(batch) for batch in batches}
     none = {batch: np.zeros(batch, dtype=bool) for batch in scenes}
     risk, rule = RiskConfig(), RuleBasedPolicy()
     encoders = {batch: StateEncoder() for batch in scenes}
@@ -79,9 +78,20 @@ def main() -> None:
         "encode": lambda b: lambda s: encoders[b].encode(s, none[b], states[b]),
         "rule_based": lambda b: lambda s: rule.decide(s, none[b]),
     }
-    for name, work in works.items():
-        times = [microseconds(work(batch), scenes[batch]) for batch in scenes]
-        sys.stdout.write(f"{name:<24}" + "".join(f"{value:>12.3f}" for value in times) + "\n")
+    return {
+        name: {f"batch_{batch}": microseconds(work(batch), scenes[batch]) for batch in scenes}
+        for name, work in works.items()
+    }
+
+
+def main() -> None:
+    """Print a table of all measurements."""
+    found = measure()
+    heads = "".join(f"{name:>12}" for name in found["assess"])
+    sys.stdout.write(f"{'us per situation':<24}{heads}\n")
+    for part, times in found.items():
+        row = "".join(f"{value:>12.3f}" for value in times.values())
+        sys.stdout.write(f"{part:<24}{row}\n")
 
 
 if __name__ == "__main__":

@@ -3,9 +3,11 @@
 
 import json
 import pickle
+import platform
 import subprocess
 import time
 from dataclasses import asdict
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -93,7 +95,7 @@ class RunFolder:
             state=session.state_config,
             decision_period_s=session.decision_period_s,
             maps=tuple(Path(name).stem for name in self._run.map_names),
-            training=outcome,
+            training={**outcome, "versions": versions()},
             git_revision=git_revision(),
         )
         policy = self.path / POLICY
@@ -113,6 +115,12 @@ class RunFolder:
 
     def _write_json(self, name: str, content: object) -> None:
         (self.path / name).write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of what computes a policy."""
+    packages = {name: version(name) for name in ("numpy", "numba", "torch")}
+    return {"python": platform.python_version(), **packages}
 
 
 def git_revision() -> str:

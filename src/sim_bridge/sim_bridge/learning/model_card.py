@@ -89,8 +89,8 @@ def _training(origin: Origin) -> str:
     rows = [
         ["preset", origin.preset],
         ["reward", origin.reward],
-        ["scenario", str(origin.run["scenario"])],
-        ["map", ", ".join(origin.maps)],
+        ["scenarios", ", ".join(origin.scenarios)],
+        ["maps", ", ".join(origin.maps)],
         ["seed", str(origin.seed)],
         ["environment steps", str(origin.steps)],
         ["best on validation after", f"{origin.best_steps} steps"],
@@ -167,8 +167,8 @@ def _results(policy: ShippedPolicy, origin: Origin, lines: Sequence[Line]) -> st
 
 
 def _limits(policy: ShippedPolicy, origin: Origin, lines: Sequence[Line]) -> str:
-    maps = ", ".join(origin.maps)
-    items = [f"- Trained on the map {maps} and the scenario {origin.run['scenario']} only."]
+    maps, scenarios = ", ".join(origin.maps), ", ".join(origin.scenarios)
+    items = [f"- All it knows are the maps ({maps}) and scenarios ({scenarios}) of its training."]
     own = lines_of(policy, lines)
     if own:
         episodes = sum(line["episodes"] for line in own)

@@ -48,6 +48,11 @@ class Origin:
         return int(self.run["seed"])
 
     @property
+    def scenarios(self) -> tuple[str, ...]:
+        """Names of the scenarios it was trained in."""
+        return tuple(str(self.run["scenario"]).split(","))
+
+    @property
     def steps(self) -> int:
         """Environment steps of the whole run."""
         return int(self.run["config"]["steps"])

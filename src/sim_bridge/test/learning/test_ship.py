@@ -119,10 +119,12 @@ def test_a_second_policy_joins_the_first_and_replaces_its_own_former_file(models
 
 
 def test_what_is_not_the_default_stands_in_the_command_that_trains_it_again(models: Path) -> None:
-    a_run(Path("run"), name="mine", map_name="t_junction", scenario="rush hour.yaml")
+    places, scenario = "four_way,t_junction", "base,rush hour.yaml"
+    a_run(Path("run"), name="mine", map_name=places, scenario=scenario)
     assert ship(models, "--run", "run", "--name", "tuned") == 0
-    command = "SEED=3 MAP=t_junction SCENARIO='rush hour.yaml' NAME=mine\n"
-    assert command in (models / "tuned.md").read_text()
+    card = (models / "tuned.md").read_text()
+    assert f"SEED=3 MAP={places} SCENARIO='{scenario}' NAME=mine\n" in card
+    assert "| scenarios | base, rush hour.yaml |" in card
 
 
 def test_the_card_holds_counts_intervals_and_the_other_seeds(models: Path) -> None:

@@ -3,6 +3,7 @@
 
 import sys
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -22,6 +23,7 @@ from sim_bridge.simulation.simulation import Simulation
 
 @pytest.fixture(scope="session")
 def settings() -> RunSettings:
+    """What is driven when nothing is asked for: the default policy."""
     return own_map_settings()
 
 
@@ -43,6 +45,7 @@ def planner(
 ) -> Iterator[PlannerDriver]:
     """Situation and policy node with the rule-based policy on the four-way crossing."""
     logs = tmp_path_factory.mktemp("planner")
-    commands = settings.planner_commands()
+    rule_based = replace(settings, policy="rule_based", scenario="demo_light")
+    commands = rule_based.planner_commands()
     with ros_session("test") as node, NodeGroup(commands, logs) as nodes:
         yield PlannerDriver(node, nodes, model)

@@ -13,8 +13,8 @@ from mcap_ros2.decoder import DecoderFactory
 from rclpy.serialization import deserialize_message
 from rosbags.rosbag2 import Reader
 
-from sim_bridge.maps import map_names
 from sim_bridge.ros import topics
+from sim_bridge.ros.record import bags
 from sim_bridge.ros.recording import installed_types, read_bag
 
 BAGS = Path(__file__).resolve().parents[1] / "bags"
@@ -34,7 +34,7 @@ def run_replay(*options: str) -> "subprocess.CompletedProcess[str]":
 
 
 @pytest.mark.ros
-@pytest.mark.parametrize("name", map_names())
+@pytest.mark.parametrize("name", bags())
 def test_the_nodes_decide_as_recorded(name: str) -> None:
     done = run_replay(str(BAGS / name))
     assert done.returncode == 0, done.stdout + done.stderr
@@ -83,7 +83,7 @@ def test_a_bag_that_is_no_good_is_named_in_one_sentence(
     assert len(done.stderr.strip().splitlines()) == 1
 
 
-@pytest.mark.parametrize("name", map_names())
+@pytest.mark.parametrize("name", bags())
 def test_an_independent_reader_finds_the_same_messages(name: str) -> None:
     ours = read_bag(BAGS / name, RECORDED)
     with (BAGS / name / f"{name}.mcap").open("rb") as file:
@@ -104,7 +104,7 @@ def test_an_independent_reader_finds_the_same_messages(name: str) -> None:
     assert ids == [[o.id for o in list_of.objects] for list_of in lists]
 
 
-@pytest.mark.parametrize("name", map_names())
+@pytest.mark.parametrize("name", bags())
 def test_a_bag_is_small_and_of_the_types_that_are_installed(name: str) -> None:
     assert sum(file.stat().st_size for file in (BAGS / name).iterdir()) < 200_000
     types = installed_types()

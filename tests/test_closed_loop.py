@@ -15,6 +15,7 @@ from rclpy.serialization import deserialize_message
 
 from risk_dqn_planner.decision import Action
 from risk_dqn_planner.policies.loading import load_policy
+from risk_dqn_planner.policies.shipped import DEFAULT_POLICY, shipped_policies
 from risk_dqn_planner.ros.conversions import to_ns
 from sim_bridge.ros import topics
 from sim_bridge.ros.recording import Bag, Stored, read_bag
@@ -74,8 +75,8 @@ def test_the_summary_says_what_was_driven_and_how_it_went(run: Run, settings: Ru
     summary = json.loads((run.folder / "summary.json").read_text("utf-8"))
     assert summary["map"] == "four_way"
     assert summary["route"] == list(settings.route)
-    assert summary["policy"] == "rule_based"
-    assert len(summary["policy_hash"]) == 64
+    assert summary["policy"] == DEFAULT_POLICY
+    assert summary["policy_hash"] == shipped_policies()[DEFAULT_POLICY].sha256
     assert [episode["seed"] for episode in summary["episodes"]] == [SEED, SEED + 1]
     for episode in summary["episodes"]:
         assert episode["result"] in {"success", "timeout"}

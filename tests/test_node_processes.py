@@ -14,6 +14,7 @@ from planner_driver import Scene
 from rclpy.node import Node
 
 from risk_dqn_planner.intersection.model import IntersectionModel
+from risk_dqn_planner.policies.shipped import DEFAULT_POLICY, shipped_policies
 from risk_dqn_planner.ros import conversions
 from sim_bridge.ros import topics
 from sim_bridge.ros.node_group import NodeGroup
@@ -131,6 +132,38 @@ def test_a_policy_that_cannot_be_loaded_stops_the_ego_for_ever(
     wait_until(lambda: len(decisions) >= 2, "decisions", PATIENCE_S, process.check)
     assert {decision.action for decision in decisions} == {Decision.STOP}
     assert "no_such_policy" in process.output()
+
+
+def test_while_the_default_policy_is_loaded_the_ego_is_told_to_stop_and_why(
+    node: Node, start: Start
+) -> None:
+    decisions: list[Decision] = []
+    node.create_subscription(Decision, topics.DECISION.name, decisions.append, topics.DECISION.qos)
+    remapped = {"~/output/decision": topics.DECISION.name}
+    process = start(NodeCommand("risk_dqn_planner", "policy_node", remappings=remapped))
+    await_ready(process)
+    assert f"ready with policy {DEFAULT_POLICY}" in process.output()
+    loading = [d for d in decisions if "still being loaded" in d.text]
+    assert loading
+    assert {(d.action, d.reason) for d in loading} == {(Decision.STOP, Decision.NO_SITUATION)}
+    seen = len(decisions)
+    wait_until(lambda: len(decisions) > seen + 1, "decisions", PATIENCE_S, process.check)
+    assert decisions[-1].text == "STOP: no situation received yet"
+    assert decisions[-1].policy_hash == shipped_policies()[DEFAULT_POLICY].sha256
+
+
+@pytest.mark.parametrize("request_to_end", [signal.SIGINT, signal.SIGTERM], ids=lambda s: s.name)
+def test_a_policy_node_can_be_ended_while_it_still_loads(
+    node: Node, start: Start, request_to_end: signal.Signals
+) -> None:
+    decisions: list[Decision] = []
+    node.create_subscription(Decision, topics.DECISION.name, decisions.append, topics.DECISION.qos)
+    remapped = {"~/output/decision": topics.DECISION.name}
+    process = start(NodeCommand("risk_dqn_planner", "policy_node", remappings=remapped))
+    wait_until(lambda: bool(decisions), "a decision", PATIENCE_S, process.check)
+    os.kill(process.pid, request_to_end)
+    assert await_end(process) == 0, process.output()
+    assert "Traceback" not in process.output(), process.output()
 
 
 class WallClockInputs:

@@ -13,6 +13,7 @@ from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 
 from launch import LaunchDescription
+from risk_dqn_planner.policies.shipped import DEFAULT_POLICY
 
 SHARE = get_package_share_path("risk_dqn_planner")
 INPUTS = ("odometry", "objects", "visible_area", "route")
@@ -25,7 +26,7 @@ def arguments() -> list[DeclareLaunchArgument]:
         ("map_origin_latitude", ".nan", "Latitude of the projection's origin [degrees]"),
         ("map_origin_longitude", ".nan", "Longitude of the projection's origin [degrees]"),
         ("map_projector", "utm", "utm, local_cartesian, mercator or local_xy"),
-        ("policy", "rule_based", "Name of a built-in policy, or a policy file"),
+        ("policy", DEFAULT_POLICY, "Name of a built-in or trained policy, or a policy file"),
         ("parameters", str(SHARE / "config" / "planner.yaml"), "File of all other parameters"),
         ("use_sim_time", "false", "Take the time from /clock"),
         ("namespace", "", "Namespace of the nodes"),

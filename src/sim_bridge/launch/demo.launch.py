@@ -5,13 +5,11 @@ ros2 launch sim_bridge demo.launch.py rviz:=true
 """
 
 from ament_index_python.packages import get_package_share_path
-from launch.actions import DeclareLaunchArgument, IncludeLaunchDescription
+from launch.actions import IncludeLaunchDescription
 from launch.launch_description_sources import PythonLaunchDescriptionSource
 from launch.substitutions import LaunchConfiguration
 
 from launch import LaunchDescription
-
-PLANNER_PARAMETERS = get_package_share_path("sim_bridge") / "config" / "demo_planner.yaml"
 
 
 def include(
@@ -28,18 +26,12 @@ def generate_launch_description() -> LaunchDescription:
     """Both packages' nodes; the arguments are those of both launch files."""
     return LaunchDescription(
         [
-            DeclareLaunchArgument(
-                "parameters",
-                default_value=str(PLANNER_PARAMETERS),
-                description="File of the planner's other parameters",
-            ),
             # First: its defaults for map and topics then hold for the planner as well.
             include("sim_bridge", "simulator"),
             include(
                 "risk_dqn_planner",
                 "planner",
                 map_file=LaunchConfiguration("map_file"),
-                parameters=LaunchConfiguration("parameters"),
                 use_sim_time="true",
             ),
         ]

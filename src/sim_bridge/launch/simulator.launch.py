@@ -46,7 +46,7 @@ def arguments() -> list[DeclareLaunchArgument]:
         ("map_origin_longitude", "8.4", "Longitude of the projection's origin [degrees]"),
         ("map_projector", "utm", "utm, local_cartesian, mercator or local_xy"),
         ("route", "[1, 9, 4]", "Lanelets of the ego's route in driving order"),
-        ("scenario", "demo_light", "Name of a scenario, or a scenario file ending in .yaml"),
+        ("scenario", "base", "Name of a scenario, or a scenario file ending in .yaml"),
         ("seed", "0", "Seed of the first episode; the next ones count on"),
         ("autostart", "true", "Start episodes without being asked through ~/reset"),
         ("lockstep", "true", "Simulated time waits for the planner"),

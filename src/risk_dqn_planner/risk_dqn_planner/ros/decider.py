@@ -44,11 +44,12 @@ class DeciderConfig:
 
 
 class UnusablePolicy(NamedTuple):
-    """Stands for a policy that could not be loaded: its name, and why."""
+    """Stands for a policy that could not be loaded, or is not loaded yet: its name, and why."""
 
     name: str
     fault: str
     hash: str = ""
+    reason: Reason = Reason.POLICY_FAILED
 
 
 class Choice(NamedTuple):
@@ -88,7 +89,7 @@ class Decider:
     def decide(self, now_ns: int) -> Choice:
         """Return the decision at a time on the clock of the stamps [ns]."""
         if isinstance(self._policy, UnusablePolicy):
-            return self._stop(Reason.POLICY_FAILED, self._policy.fault)
+            return self._stop(self._policy.reason, self._policy.fault)
         report = self._report
         if report is None:
             return self._stop(Reason.NO_SITUATION, "no situation received yet")

@@ -17,6 +17,7 @@ from rclpy.node import Node
 
 from risk_dqn_planner.errors import ConfigurationError
 from risk_dqn_planner.map.loader import LOCAL_XY, MapOrigin, RoadMap, load_map
+from risk_dqn_planner.policies.shipped import DEFAULT_POLICY
 
 Config = TypeVar("Config")
 
@@ -103,8 +104,8 @@ class PolicyParameters:
     """Which policy decides how often."""
 
     policy: str = field(
-        default="rule_based",
-        metadata={"description": "Name of a built-in policy, or a policy file"},
+        default=DEFAULT_POLICY,
+        metadata={"description": "Name of a built-in or trained policy, or a policy file"},
     )
     rate_hz: float = field(
         default=2.0,

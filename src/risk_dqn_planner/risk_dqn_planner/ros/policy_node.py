@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Publishes a decision twice a second, whatever the inputs do."""
 
+import os
+
 import numpy as np
 from intersection_msgs.msg import Decision, Situation
 from rclpy.node import Node
@@ -11,6 +13,7 @@ from risk_dqn_planner.errors import InputError, PolicyError
 from risk_dqn_planner.policies.base import Policy
 from risk_dqn_planner.policies.loading import load_policy
 from risk_dqn_planner.ros import conversions, markers
+from risk_dqn_planner.ros.background import spinning
 from risk_dqn_planner.ros.clock import is_simulated, now_ns, on_clock_back, steady_timer
 from risk_dqn_planner.ros.decider import Choice, Decider, DeciderConfig, UnusablePolicy
 from risk_dqn_planner.ros.diagnostics import ERROR, OK, Diagnostics
@@ -30,23 +33,41 @@ class PolicyNode(Node):
         super().__init__("policy")
         self._settings = declare(self, PolicyParameters)
         config = declare(self, DeciderConfig)
-        self._policy = self._load()
-        self._decider = Decider(self._policy, explain, config)
-        self._reason: Reason | None = None
-        self._due_ns: int | None = None  # time of a decision that waits for its situation
         patience_s = declare(self, ClockParameters).sim_time_patience_s
         self._patient = is_simulated(self) and patience_s > 0.0
         self._patience = steady_timer(self, patience_s, self._decide_now)
         self._patience.cancel()
-        self._publisher = self.create_publisher(Decision, "~/output/decision", NEWEST)
-        self._marker_publisher = self.create_publisher(MarkerArray, "~/debug/markers", NEWEST)
+        self._reason: Reason | None = None
+        self._due_ns: int | None = None  # time of a decision that waits for its situation
         self._diagnostics = Diagnostics(self, "planner")
+        if is_simulated(self):
+            # Its clock waits for a planner that is ready: before, there is no time to decide at.
+            policy = self._load()
+            self._decider = Decider(policy, explain, config)
+            self._speak()
+        else:
+            self._decider = Decider(self._not_yet(), explain, config)
+            self._speak()
+            with spinning(self):
+                policy = self._load()
+            self._decider = Decider(policy, explain, config)
         self._clock_back = on_clock_back(self, self._decider.forget)
         self.create_subscription(Situation, "~/input/situation", self._on_situation, NEWEST)
+        self.get_logger().info(f"ready with policy {policy.name}")
+
+    def _speak(self) -> None:
+        """Begin to decide twice a second, and to tell about it."""
+        self._publisher = self.create_publisher(Decision, "~/output/decision", NEWEST)
+        self._marker_publisher = self.create_publisher(MarkerArray, "~/debug/markers", NEWEST)
         # On the node's clock: with simulated time, decisions fall on multiples of the period.
         self.create_timer(1.0 / self._settings.rate_hz, self._on_tick)
         steady_timer(self, DIAGNOSTICS_PERIOD_S, self._diagnostics.publish)
-        self.get_logger().info(f"ready with policy {self._policy.name}")
+
+    def _not_yet(self) -> UnusablePolicy:
+        """Stand in for the policy while it is loaded, which takes torch some seconds."""
+        name = self._settings.policy
+        text = f"policy {name} is still being loaded"
+        return UnusablePolicy(name, text, reason=Reason.NO_SITUATION)
 
     def _load(self) -> Policy | UnusablePolicy:
         """Load the policy and let it decide once, so that the first real decision is not late.
@@ -127,4 +148,6 @@ class PolicyNode(Node):
 
 def main() -> int:
     """Run the node; the exit code."""
+    # One decision is too small to share among threads of torch; sharing would only vary its time.
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
     return run("policy", PolicyNode)

@@ -197,3 +197,12 @@ def test_a_policy_that_could_not_be_loaded_stops_the_vehicle_whatever_arrives() 
         assert reason(choice) is Reason.POLICY_FAILED
         assert choice.decision.text == "STOP: net.pt does not exist"
         assert choice.decision.policy_name == "net.pt"
+
+
+def test_a_policy_that_is_not_loaded_yet_stops_the_vehicle_and_says_so() -> None:
+    text = "policy net.pt is still being loaded"
+    node = decider(UnusablePolicy("net.pt", text, reason=Reason.NO_SITUATION))
+    choice = decide_at(node, 1000, report(1000))
+    assert choice.decision.action is Action.STOP
+    assert reason(choice) is Reason.NO_SITUATION
+    assert choice.decision.text == f"STOP: {text}"

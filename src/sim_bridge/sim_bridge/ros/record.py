@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Records a small bag of each own map: one episode's inputs and the decisions taken on them."""
+"""Records small bags: one episode's inputs each, and the decisions taken on them.
+
+One bag of each own map with Algorithm 1, which stays as it is, and one with the planner's default
+policy, to be recorded again whenever another one is shipped.
+"""
 
 import argparse
 import shutil
@@ -10,6 +14,7 @@ from contextlib import closing
 from pathlib import Path
 
 from risk_dqn_planner.errors import PlannerError
+from risk_dqn_planner.policies.shipped import DEFAULT_POLICY
 from sim_bridge.maps import map_names
 from sim_bridge.ros.drive import drive
 from sim_bridge.ros.planner_link import DECISION_PERIOD_NS
@@ -21,6 +26,16 @@ from sim_bridge.ros.topics import DECISION, INPUTS
 _TOPICS = (*INPUTS, DECISION)
 _DEFAULT_SEED = 0
 _KEPT_AFTER_DECISION_NS = (0, 300_000_000)
+_TRAINED_MAP = "four_way"
+
+
+def bags() -> dict[str, RunSettings]:
+    """Return what is driven in each bag, by the bag's name."""
+    trained = f"{_TRAINED_MAP}_{DEFAULT_POLICY}"
+    return {
+        **{name: own_map_settings(name, "rule_based", "demo_light") for name in map_names()},
+        trained: own_map_settings(_TRAINED_MAP),
+    }
 
 
 def thinned(messages: Sequence[Stored]) -> list[Stored]:
@@ -57,7 +72,7 @@ def record(settings: RunSettings, seed: int, target: Path) -> str:
 
 def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="record", description=__doc__)
-    parser.add_argument("--map", choices=map_names(), help="only this map [all]")
+    parser.add_argument("--bag", choices=list(bags()), help="only this one [all]")
     parser.add_argument("--seed", type=int, default=_DEFAULT_SEED, help="[%(default)s]")
     parser.add_argument(
         "--folder", type=Path, default=Path("bags"), help="where the bags go [%(default)s]"
@@ -68,10 +83,11 @@ def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command."""
     arguments = _arguments(argv)
-    names = [arguments.map] if arguments.map else map_names()
     try:
-        for name in names:
-            went = record(own_map_settings(name), arguments.seed, arguments.folder / name)
+        for name, settings in bags().items():
+            if arguments.bag not in (None, name):
+                continue
+            went = record(settings, arguments.seed, arguments.folder / name)
             size_kb = sum(f.stat().st_size for f in (arguments.folder / name).iterdir()) / 1000.0
             print(f"{arguments.folder / name}: {went}, {size_kb:.0f} kB")
     except PlannerError as error:

@@ -9,6 +9,7 @@ from pathlib import Path
 from risk_dqn_planner.errors import BagError, ConfigurationError, PlannerError
 from risk_dqn_planner.map.loader import MapOrigin
 from risk_dqn_planner.map.route import parse_route
+from risk_dqn_planner.policies.shipped import DEFAULT_POLICY
 from sim_bridge.maps import map_names, shipped_map
 from sim_bridge.ros.process import NodeCommand, ParameterValue
 from sim_bridge.ros.topics import remappings
@@ -16,8 +17,7 @@ from sim_bridge.scenarios.loading import load_scenario
 
 DEFAULT_MAP = "four_way"
 DEFAULT_PROJECTOR = "utm"
-DEFAULT_POLICY = "rule_based"
-DEFAULT_SCENARIO = "demo_light"
+DEFAULT_SCENARIO = "base"
 
 # Lock-step has time: on a busy computer a situation may reach the policy long after the clock.
 _LOCKSTEP: dict[str, ParameterValue] = {"use_sim_time": True, "sim_time_patience_s": 1.0}
@@ -112,11 +112,14 @@ def add_run_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--scenario", default=DEFAULT_SCENARIO, help="name [%(default)s]")
 
 
-def own_map_settings(name: str = DEFAULT_MAP) -> RunSettings:
+def own_map_settings(
+    name: str = DEFAULT_MAP, policy: str = DEFAULT_POLICY, scenario: str = DEFAULT_SCENARIO
+) -> RunSettings:
     """Return what is driven on an own map when nothing else is asked for."""
     parser = argparse.ArgumentParser()
     add_run_arguments(parser)
-    return run_settings(parser.parse_args(["--map", name]))
+    options = ["--map", name, "--policy", policy, "--scenario", scenario]
+    return run_settings(parser.parse_args(options))
 
 
 def run_settings(arguments: argparse.Namespace) -> RunSettings:

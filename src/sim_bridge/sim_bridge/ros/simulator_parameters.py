@@ -16,7 +16,7 @@ class SimulatorParameters:
     """What is simulated, and how fast."""
 
     scenario: str = field(
-        default="demo_light",
+        default="base",
         metadata={"description": "Name of a scenario, or a scenario file ending in .yaml"},
     )
     seed: int = field(

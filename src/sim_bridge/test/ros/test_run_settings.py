@@ -4,6 +4,7 @@ import argparse
 import pytest
 
 from risk_dqn_planner.errors import BagError, ConfigurationError, MapFileError
+from risk_dqn_planner.policies.shipped import DEFAULT_POLICY
 from sim_bridge.ros.run_settings import (
     RunSettings,
     add_run_arguments,
@@ -74,4 +75,4 @@ def test_nodes_get_their_parameters_and_topics_on_the_command_line() -> None:
     assert "~/input/objects:=/objects" in situation
     assert "~/output/situation:=/situation" in situation
     assert "~/input/situation:=/situation" in policy
-    assert 'policy:="rule_based"' in policy
+    assert f'policy:="{DEFAULT_POLICY}"' in policy

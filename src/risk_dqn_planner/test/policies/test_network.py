@@ -37,6 +37,24 @@ def test_layers_have_the_papers_sizes() -> None:
     ]
 
 
+def test_every_layer_has_the_papers_shape_and_there_is_no_other() -> None:
+    shapes = {name: tuple(p.shape) for name, p in make_network().named_parameters()}
+    assert shapes == {
+        "h_ego.weight": (20, 15),
+        "h_ego.bias": (20,),
+        "h_veh.weight": (20, 15),
+        "h_veh.bias": (20,),
+        "h_occ.weight": (20, 15),
+        "h_occ.bias": (20,),
+        "h_q.0.weight": (120, 160),
+        "h_q.0.bias": (120,),
+        "h_q.2.weight": (120, 120),
+        "h_q.2.bias": (120,),
+        "h_q.4.weight": (3, 120),
+        "h_q.4.bias": (3,),
+    }
+
+
 def naive(network: RiskDqn, state: Floats) -> Floats:
     """The paper's figure column by column, for one state (5, 3, 8)."""
     weights = {n: p.detach().double().numpy() for n, p in network.named_parameters()}
@@ -71,6 +89,44 @@ def test_vehicles_share_their_weights_and_so_do_lanes() -> None:
         mixed = states[..., [0, 4, 1, 5, 3, 2, 7, 6]]
         torch.testing.assert_close(network(mixed), network(states))
         assert not torch.allclose(network(states[..., [1, 0, *range(2, 8)]]), network(states))
+
+
+def embeddings(network: RiskDqn, states: torch.Tensor) -> torch.Tensor:
+    """What h_Q is fed with, shape (B, 8, 20): 20 features for each column of the scenes."""
+    fed: list[torch.Tensor] = []
+    hook = network.h_q.register_forward_pre_hook(lambda _, given: fed.append(given[0]))
+    with torch.no_grad():
+        network(states)
+    hook.remove()
+    return fed[0].unflatten(1, (8, 20))
+
+
+def test_permuting_vehicles_permutes_their_embeddings_and_so_it_is_with_lanes() -> None:
+    network, states = make_network(), some_states()
+    order = [0, 4, 1, 5, 3, 2, 7, 6]
+    before, after = embeddings(network, states), embeddings(network, states[..., order])
+    torch.testing.assert_close(after, before[:, order])
+
+
+def test_a_column_moves_no_embedding_but_its_own() -> None:
+    network, states = make_network(), some_states()
+    for column in range(8):
+        changed = states.clone()
+        changed[..., column] += 0.5
+        moved = (embeddings(network, changed) != embeddings(network, states)).any(dim=(0, 2))
+        assert moved.nonzero().flatten().tolist() == [column]
+
+
+def test_ego_vehicles_and_lanes_have_weights_of_their_own() -> None:
+    # The same numbers in every column: one embedding for all vehicles, another for both lanes.
+    same = some_states()[..., :1].expand(-1, -1, -1, 8)
+    ego, vehicle, *rest = embeddings(make_network(), same).unbind(dim=1)
+    for other in rest[:4]:
+        torch.testing.assert_close(other, vehicle)
+    torch.testing.assert_close(rest[4], rest[5])
+    assert not torch.allclose(ego, vehicle)
+    assert not torch.allclose(ego, rest[4])
+    assert not torch.allclose(vehicle, rest[4])
 
 
 def test_the_scripted_network_equals_the_eager_one() -> None:

@@ -101,6 +101,39 @@ def test_without_its_break_the_printed_loop_would_crawl(situation: Make) -> None
     assert decide(s).action[0] == Action.FAST
 
 
+def as_printed(s: Situations) -> np.ndarray[Any, np.dtype[np.int64]]:
+    """Algorithm 1 to the letter: every safe action overwrites the one before, fast comes first."""
+    safe = foresee(s, RuleBasedConfig()).total >= 0.0
+    best = np.zeros(len(safe), dtype=np.int64)
+    for action in (Action.FAST, Action.SLOW):
+        best[safe[:, action]] = action
+    return best
+
+
+def test_as_printed_it_crawls_over_an_intersection_that_nobody_else_is_near(
+    situation: Make,
+) -> None:
+    # "Always takes the fastest safe velocity": fast is safe, and the printed loop takes slow.
+    s = situation()
+    assert as_printed(s)[0] == Action.SLOW
+    assert decide(s).action[0] == Action.FAST
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.integers(0, 2**32 - 1))
+def test_the_missing_break_matters_just_where_fast_and_slow_are_safe(
+    random_situations: Make, seed: int
+) -> None:
+    s = random_situations(seed, 64)
+    printed, ours = as_printed(s), decide(s).action
+    safe = foresee(s, RuleBasedConfig()).total >= 0.0
+    differ = printed != ours
+    # Where both are safe slow overwrites fast; nowhere else does the break matter.
+    np.testing.assert_array_equal(differ, safe[:, Action.FAST] & safe[:, Action.SLOW])
+    assert (printed[differ] == Action.SLOW).all()
+    assert (ours[differ] == Action.FAST).all()
+
+
 def test_it_waits_for_a_vehicle_that_may_linger_in_the_zone(situation: Make) -> None:
     # 5 m before the centre, 8 m to leave in 2 s: at 3.9 m/s it may still be there.
     for mps, action in ((3.9, Action.STOP), (4.1, Action.FAST)):

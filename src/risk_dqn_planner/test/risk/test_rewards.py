@@ -110,6 +110,75 @@ def test_the_printed_sign_of_the_gap_rates_danger_as_safe() -> None:
     assert gap_reward(reach_s - leave_s, 3.0, 0.1) == -1.0
 
 
+def test_a_vehicle_that_is_gone_is_safe_however_long_the_ego_takes() -> None:
+    for leave_s in (0.0, 3.0, 1e6):
+        assert safe_leave_reward(math.inf, leave_s, 3.0, 0.1) == 0.0
+
+
+def test_at_top_speed_from_the_start_times_are_way_over_speed() -> None:
+    # 5 + 3 = 8 m at 5 m/s; 38 - 3 = 35 m at 7 m/s.
+    assert leave_time(5.0, 6.0, 5.0, 1.5, 5.0) == pytest.approx(1.6)
+    assert reach_time(38.0, 6.0, 7.0, 2.0, 7.0) == pytest.approx(5.0)
+
+
+def test_top_speed_that_is_reached_just_at_the_zone_leaves_both_formulas_equal() -> None:
+    # From 3 to 7 m/s at 2 m/s^2 takes 2 s and 10 m: the zone begins there, at 13 m to its centre.
+    assert reach_time(13.0, 6.0, 3.0, 2.0, 7.0) == pytest.approx(2.0)
+    assert reach_time(13.0, 6.0, 3.0, 2.0, 7.0) == reach_time(13.0, 6.0, 3.0, 2.0, 100.0)
+    # One metre further is driven at 7 m/s.
+    assert reach_time(14.0, 6.0, 3.0, 2.0, 7.0) == pytest.approx(2.0 + 1.0 / 7.0)
+
+
+def test_at_the_exact_thresholds_the_better_branch_counts() -> None:
+    # At rest at d_safe = 3.1 m with the line at 5.5 m: the middle branch has come down to -1.
+    assert stop_reward(ego_m=3.1, line_m=-2.4) == pytest.approx(-1.0)
+    # A line at exactly d_safe: whoever rests there rests at the line.
+    assert stop_reward(ego_m=3.1, line_m=0.0) == 0.0
+    # The quadratic of R_CSL meets both of its neighbours.
+    assert gap_reward(0.1, 3.0, 0.1) == -1.0
+    assert gap_reward(3.0 - 1e-9, 3.0, 0.1) == pytest.approx(0.0, abs=1e-15)
+
+
+def printed_gap(ego_m: float, other_m: float) -> float:
+    """t_gap as the paper prints it: from rest, no top speeds, l = 6 m."""
+    leave_s = math.sqrt(2.0 * (ego_m + 3.0) / 1.5)
+    reach_s = math.sqrt(2.0 * (other_m - 3.0) / 2.0)
+    return leave_s - reach_s
+
+
+def read_gap(ego_m: float, other_m: float) -> float:
+    """t_gap as the paper's prose and thresholds have it, from the project's own functions."""
+    reach_s: float = reach_time(other_m, 6.0, 0.0, 2.0, 1e3)
+    leave_s: float = leave_time(ego_m, 6.0, 0.0, 1.5, 1e3)
+    return reach_s - leave_s
+
+
+def test_as_printed_a_dangerous_gap_ranks_above_a_safe_one() -> None:
+    # The ego, 15 m off, needs 4.90 s to leave. A vehicle 0.5 m before the zone is there in 0.71 s,
+    # one 97 m before it in 9.85 s.
+    dangerous, safe = (15.0, 3.5), (15.0, 100.0)
+    assert printed_gap(*dangerous) == pytest.approx(4.1919, abs=1e-4)
+    assert printed_gap(*safe) == pytest.approx(-4.9499, abs=1e-4)
+    # "If t_gap > t_des the ego vehicle can safely leave before the other vehicle can reach it":
+    # the printed equation says so of the vehicle that is there four seconds before the ego has
+    # left, and calls fully unsafe (t_gap < t_safe) the one that comes five seconds after.
+    assert gap_reward(printed_gap(*dangerous), 3.0, 0.1) == 0.0
+    assert gap_reward(printed_gap(*safe), 3.0, 0.1) == -1.0
+    assert gap_reward(read_gap(*dangerous), 3.0, 0.1) == -1.0
+    assert gap_reward(read_gap(*safe), 3.0, 0.1) == 0.0
+
+
+@given(st.floats(-2.0, 40.0), st.floats(3.0, 100.0), st.floats(0.1, 50.0))
+def test_as_printed_a_vehicle_that_is_further_away_is_never_safer(
+    ego_m: float, other_m: float, further_m: float
+) -> None:
+    printed = [gap_reward(printed_gap(ego_m, d), 3.0, 0.1) for d in (other_m, other_m + further_m)]
+    read = [gap_reward(read_gap(ego_m, d), 3.0, 0.1) for d in (other_m, other_m + further_m)]
+    assert printed[1] <= printed[0]
+    assert read[1] >= read[0]
+    assert read_gap(ego_m, other_m) == pytest.approx(-printed_gap(ego_m, other_m), abs=1e-9)
+
+
 @given(st.floats(-20.0, 60.0), st.floats(-25.0, 60.0), st.floats(0.0, 5.0))
 def test_stopping_earlier_is_never_worse(ego_m: float, line_m: float, speed: float) -> None:
     reward = stop_reward(ego_m, line_m, speed)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from risk_dqn_planner.policies.base import Action, Decisions, Policy, Reason
+from risk_dqn_planner.policies.base import Action, Decisions, Policy, Reason, Supervision
 from risk_dqn_planner.policies.rule_based import RuleBasedConfig
 from risk_dqn_planner.risk.motion import distance_after, speed_after
 from risk_dqn_planner.risk.rewards import leader_gap, leave_time, reach_time
@@ -14,6 +14,8 @@ from risk_dqn_planner.situation.situations import Situations
 from risk_dqn_planner.vehicle import EgoLimits
 
 __all__ = ["Action", "Decision", "Reason", "explain", "fault_decision", "target_speed"]
+
+_OBJECTIONS = {Supervision.OBJECTED: "objects to", Supervision.OVERRULED: "overrules"}
 
 
 @dataclass(frozen=True)
@@ -23,6 +25,7 @@ class Decision:
     q_values and action_risks are (3,) by Action, NaN where the policy has none; a risk is in
     [0, 1], 0 safe, 1 fully unsafe, the negated R_risk of the paper after the action.
     critical_vehicle_id and critical_lane_id name what decided; None where nothing did.
+    proposed: the policy's own action where a supervisor checked it, else None.
     """
 
     action: Action
@@ -35,6 +38,8 @@ class Decision:
     critical_lane_id: int | None
     policy_name: str
     policy_hash: str
+    supervision: Supervision = Supervision.OFF
+    proposed: Action | None = None
 
 
 def target_speed(action: Action, ego: EgoLimits) -> float:
@@ -66,10 +71,14 @@ def explain(
         text = f"highest value of {policy.name} ({listed})"
     else:
         text = "" if lane >= 0 else "no conflict within range"
+    supervision, proposed = _supervision(decisions, index)
+    if proposed is not None and supervision in _OBJECTIONS:
+        text = _joined(text, f"the supervisor {_OBJECTIONS[supervision]} {proposed.name}")
     if lane >= 0:
         one = Situations._make(field[index] for field in situations)
-        conflict = _conflict(one, vehicle, lane, action, config)
-        text = f"{text}; {conflict}" if text else conflict
+        lacking_s = np.nan if decisions.lacking_s is None else float(decisions.lacking_s[index])
+        outlook = _outlook(one, lane, action, proposed, lacking_s, config)
+        text = _joined(text, _conflict(one, vehicle, lane, outlook, config))
     return Decision(
         action=action,
         target_speed_mps=target_speed(action, config.risk.ego),
@@ -81,7 +90,20 @@ def explain(
         critical_lane_id=int(situations.lane_id[index, lane]) if lane >= 0 else None,
         policy_name=policy.name,
         policy_hash=policy.hash,
+        supervision=supervision,
+        proposed=proposed,
     )
+
+
+def _joined(text: str, more: str) -> str:
+    return f"{text}; {more}" if text else more
+
+
+def _supervision(decisions: Decisions, index: int) -> tuple[Supervision, Action | None]:
+    """Return the supervisor's verdict on one decision, and what the policy proposed."""
+    if decisions.supervision is None or decisions.proposed is None:
+        return Supervision.OFF, None
+    return Supervision(int(decisions.supervision[index])), Action(int(decisions.proposed[index]))
 
 
 def fault_decision(
@@ -102,22 +124,20 @@ def fault_decision(
     )
 
 
-def _conflict(
-    s: Situations, vehicle: int, lane: int, action: Action, config: RuleBasedConfig
-) -> str:
-    """Say who forbids the next faster action; `s` is one situation, its batch axis gone."""
+def _conflict(s: Situations, vehicle: int, lane: int, outlook: str, config: RuleBasedConfig) -> str:
+    """Say who forbids an action; `s` is one situation, its batch axis gone.
+
+    outlook: what follows for the ego.
+    """
     traffic_mps2 = config.risk.traffic.acceleration_mps2
     zone_m, limit_mps = float(s.lane_zone_m[lane]), float(s.lane_speed_limit_mps[lane])
-    zone, leaving = (
-        f"the conflict zone of lane {s.lane_id[lane]}",
-        _leaving(s, lane, action, config),
-    )
+    zone = f"the conflict zone of lane {s.lane_id[lane]}"
     if vehicle < 0:
         hidden_m = float(s.lane_hidden_distance_m[lane])
         reach_s = reach_time(hidden_m, zone_m, limit_mps, traffic_mps2, limit_mps)
         return (
             f"lane {s.lane_id[lane]} hides whatever is beyond {hidden_m:.1f} m; a vehicle there "
-            f"at {limit_mps:.1f} m/s reaches the conflict zone in {reach_s:.1f} s, {leaving}"
+            f"at {limit_mps:.1f} m/s reaches the conflict zone in {reach_s:.1f} s, {outlook}"
         )
     who = f"vehicle {s.vehicle_id[vehicle]}"
     distance_m, speed_mps = (
@@ -130,8 +150,27 @@ def _conflict(
         return f"{who} from lane {s.lane_id[lane]} is {ahead_m:.1f} m ahead at {speed_mps:.1f} m/s"
     reach_s = reach_time(distance_m, zone_m, speed_mps, traffic_mps2, limit_mps)
     if reach_s <= 0.0:
-        return f"{who} is in {zone}, {leaving}"
-    return f"{who} can reach {zone} in {reach_s:.1f} s, {leaving}"
+        return f"{who} is in {zone}, {outlook}"
+    return f"{who} can reach {zone} in {reach_s:.1f} s, {outlook}"
+
+
+def _outlook(
+    s: Situations,
+    lane: int,
+    action: Action,
+    proposed: Action | None,
+    lacking_s: float,
+    config: RuleBasedConfig,
+) -> str:
+    """Say what follows for the ego from the action that is forbidden.
+
+    Where the joint check forbids it, `lacking_s` is no NaN: nothing would be left to do.
+    """
+    if np.isnan(lacking_s):
+        return _leaving(s, lane, action, config)
+    forbidden = Action(min(action + 1, Action.FAST)) if proposed is None else proposed
+    by = f" by {lacking_s:.1f} s" if np.isfinite(lacking_s) else ""
+    return f"no safe manoeuvre would be left after {forbidden.name}{by}"
 
 
 def _leaving(s: Situations, lane: int, action: Action, config: RuleBasedConfig) -> str:

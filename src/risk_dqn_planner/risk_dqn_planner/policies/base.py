@@ -33,6 +33,15 @@ class Reason(enum.IntEnum):
     POLICY_FAILED = 13  # the policy could not be evaluated
 
 
+class Supervision(enum.IntEnum):
+    """What the supervisor says of a decision; the codes are those of intersection_msgs/Decision."""
+
+    OFF = 0  # no supervisor ran
+    AGREED = 1  # the policy's action is sound
+    OBJECTED = 2  # it is not, and is carried out all the same
+    OVERRULED = 3  # it is not, and a sound one stands in
+
+
 class Decisions(NamedTuple):
     """Decisions for B situations.
 
@@ -40,6 +49,9 @@ class Decisions(NamedTuple):
     in [0, 1], 0 safe, 1 fully unsafe. reason (B,): Reason.
     critical_vehicle (B,): index into the N vehicle places, -1 none.
     critical_lane (B,): index into the M lanes, -1 none.
+    supervision (B,): Supervision, and proposed (B,): the action before it was checked; None
+    without a supervisor. lacking_s (B,): where the joint check forbids the next faster action, or
+    the proposed one, the time that is missing; NaN where something else decided, None if all.
     """
 
     action: NDArray[np.int64]
@@ -48,6 +60,9 @@ class Decisions(NamedTuple):
     reason: Integers
     critical_vehicle: Integers
     critical_lane: Integers
+    supervision: Integers | None = None
+    proposed: Integers | None = None
+    lacking_s: Floats | None = None
 
 
 class Policy(Protocol):

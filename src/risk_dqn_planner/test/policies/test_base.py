@@ -45,5 +45,8 @@ def test_at_the_goal_nothing_is_critical_and_other_rows_stay(random_situations: 
     assert (stopped.critical_lane[at_goal] == -1).all()
     assert (stopped.critical_vehicle[at_goal] == -1).all()
     for before, after in zip(plain, stopped, strict=True):
+        if before is None or after is None:
+            assert before is after
+            continue
         np.testing.assert_array_equal(before[~at_goal], after[~at_goal])
     assert (outer.name, outer.hash) == (inner.name, inner.hash)

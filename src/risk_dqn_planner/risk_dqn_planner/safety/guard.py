@@ -1,0 +1,42 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The joint check with all that has to be remembered from one decision to the next."""
+
+import numpy as np
+
+from risk_dqn_planner.safety.assumptions import SafetyAssumptions
+from risk_dqn_planner.safety.commitment import Commitments
+from risk_dqn_planner.safety.familiarity import Familiarity
+from risk_dqn_planner.safety.joint_check import JointCheck, joint_check
+from risk_dqn_planner.situation.situations import Booleans, Integers, Situations
+
+
+class Guard:
+    """For each decision call `look`, choose, and call `decided`.
+
+    Where nothing is admissible, `otherwise` is what was verified last: sound all the same.
+    """
+
+    def __init__(self, assumptions: SafetyAssumptions | None = None) -> None:
+        self.assumptions = assumptions or SafetyAssumptions()
+        self._commitments = Commitments()
+        self._familiarity = Familiarity(self.assumptions)
+
+    def look(self, situations: Situations, restart: Booleans) -> JointCheck:
+        """Check the actions of B situations; `restart` (B,) marks where the memory is void."""
+        in_force = self._commitments.in_force(restart)
+        reacted_m = self._familiarity.reacted_m(situations, restart)
+        return joint_check(situations, self.assumptions, in_force, reacted_m)
+
+    def otherwise(self) -> Integers:
+        """Return the action (B,) that carries on with the manoeuvre verified last."""
+        return self._commitments.next_action()
+
+    def sound(self, check: JointCheck) -> Booleans:
+        """Return which actions (B, 3) are sound: the admissible ones, else what was verified."""
+        actions = np.arange(check.admissible.shape[1])
+        kept = self.otherwise()[:, None] == actions
+        return np.where(check.admissible.any(axis=1, keepdims=True), check.admissible, kept)
+
+    def decided(self, check: JointCheck, action: Integers) -> None:
+        """Take note of the actions (B,) that will be carried out."""
+        self._commitments.carry_on(check, action)

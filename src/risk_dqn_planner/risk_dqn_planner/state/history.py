@@ -65,8 +65,8 @@ class StateEncoder:
     ) -> States:
         """Return the states (B, 5, 3, 8), float32 in [-1, 1], in `out` if it is given.
 
-        Raises InputError if shapes disagree or the batch changes its size without restarting
-        all its rows.
+        Raises InputError if shapes disagree, `out` has gaps in memory, or the batch changes its
+        size without restarting all its rows.
         """
         shape = (situations.ego_speed_mps.shape[0], SCENES, ROWS, COLUMNS)
         self._make_room(situations, restart)
@@ -77,6 +77,8 @@ class StateEncoder:
                 f"out has shape {out.shape} and restart {restart.shape}, "
                 f"expected {shape} and {shape[:1]}"
             )
+        if not out.flags.c_contiguous:
+            raise InputError(f"out has strides {out.strides}, expected an array without gaps")
         self._head = (self._head + 1) % SCENES
         encode_into(situations, restart, self._parameters, self._head, self._memory, out)
         return out

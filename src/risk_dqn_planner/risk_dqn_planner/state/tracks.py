@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from risk_dqn_planner.compiled import kernel
 from risk_dqn_planner.situation.situations import Floats, Integers, Situations
 from risk_dqn_planner.state.encoding import (
+    COLUMNS,
     ROWS,
     SCENES,
     TAKEN,
@@ -153,33 +154,35 @@ def recall(
     Each entry brings its own values of the `known` (B,) last scenes; where it was absent, the next
     later one stands in. Missing entries are 1, 0, 1.
     """
-    entries, number, lane, values = track.entries, track.number, track.lane, track.values
-    slots = chosen.shape[1]
-    for row in range(len(entries)):
+    entries, number, lane = track.entries, track.number, track.lane
+    batch, room = number.shape[0], number.shape[2]
+    # One dimension for all within a row: a place is found by fewer products.
+    values = track.values.reshape((batch, SCENES * room * ROWS))
+    cells = out.reshape((batch, SCENES * ROWS * COLUMNS))
+    for row in range(batch):
         for slot in range(count[row]):
-            then, place = head, chosen[row, slot]
+            place = chosen[row, slot]
+            wanted, wanted_lane = number[row, head, place], lane[row, head, place]
+            at = (head * room + place) * ROWS
+            distance, speed, ego = values[row, at], values[row, at + 1], values[row, at + 2]
             for k in range(SCENES):
                 if 0 < k < known[row]:
-                    earlier = scene_before(head, k)
+                    then = scene_before(head, k)
                     found = find(
-                        number,
-                        lane,
-                        row,
-                        head,
-                        chosen[row, slot],
-                        earlier,
-                        entries[row, earlier],
-                        place,
+                        number, lane, row, then, entries[row, then], wanted, wanted_lane, place
                     )
                     if found >= 0:
-                        then, place = earlier, found
-                for i in range(ROWS):
-                    out[row, k, i, column + slot] = values[row, then, place, i]
-        for slot in range(count[row], slots):
+                        place, at = found, (then * room + found) * ROWS
+                        distance, speed = values[row, at], values[row, at + 1]
+                        ego = values[row, at + 2]
+                cell = k * ROWS * COLUMNS + column + slot
+                cells[row, cell], cells[row, cell + COLUMNS] = distance, speed
+                cells[row, cell + 2 * COLUMNS] = ego
+        for slot in range(count[row], chosen.shape[1]):
             for k in range(SCENES):
-                out[row, k, 0, column + slot] = 1.0
-                out[row, k, 1, column + slot] = 0.0
-                out[row, k, 2, column + slot] = 1.0
+                cell = k * ROWS * COLUMNS + column + slot
+                cells[row, cell], cells[row, cell + COLUMNS] = 1.0, 0.0
+                cells[row, cell + 2 * COLUMNS] = 1.0
 
 
 @kernel
@@ -187,24 +190,23 @@ def find(
     number: Integers,
     lane: Integers,
     row: int,
-    head: int,
-    entry: int,
     then: int,
     entries: int,
+    wanted: int,
+    wanted_lane: int,
     place: int,
 ) -> int:
-    """Return the place in an earlier scene of an entry of the present one, -1 if absent.
+    """Return the place of a number on a lane among the entries of an earlier scene, -1 if absent.
 
     It seldom changes its place from scene to scene, so `place` is looked at first.
     """
-    wanted_number, wanted_lane = number[row, head, entry], lane[row, head, entry]
     if (
         place < entries
-        and number[row, then, place] == wanted_number
+        and number[row, then, place] == wanted
         and lane[row, then, place] == wanted_lane
     ):
         return place
     for at in range(entries):
-        if number[row, then, at] == wanted_number and lane[row, then, at] == wanted_lane:
+        if number[row, then, at] == wanted and lane[row, then, at] == wanted_lane:
             return at
     return -1

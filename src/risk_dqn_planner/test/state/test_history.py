@@ -255,3 +255,10 @@ def test_arrays_of_wrong_shape_are_refused(random_situations: Make) -> None:
         StateEncoder().encode(s, np.ones(1, dtype=bool))
     with pytest.raises(InputError, match="expected"):
         StateEncoder().encode(s, np.ones(2, dtype=bool), np.empty((2, 3, 8), dtype=np.float32))
+
+
+def test_an_array_with_gaps_is_refused(random_situations: Make) -> None:
+    s = random_situations(seed=1, batch=2)
+    every_second = np.empty((4, 5, 3, 8), dtype=np.float32)[::2]
+    with pytest.raises(InputError, match="without gaps"):
+        StateEncoder().encode(s, np.ones(2, dtype=bool), every_second)

@@ -13,6 +13,7 @@ from risk_dqn_planner.intersection.builder import build_intersection
 from risk_dqn_planner.intersection.config import IntersectionConfig
 from risk_dqn_planner.intersection.model import IntersectionModel
 from risk_dqn_planner.map.loader import MapOrigin, RoadMap, load_map
+from risk_dqn_planner.situation.config import INSTANTANEOUS, TrackingConfig
 from sim_bridge.maps import shipped_map
 from sim_bridge.scenarios.loading import Scenario
 from sim_bridge.simulation.simulation import Simulation
@@ -26,9 +27,22 @@ class Place:
     model: IntersectionModel
     outlines: tuple[NDArray[np.float64], ...]
 
-    def simulation(self, scenario: Scenario, batch: int) -> Simulation:
-        """Lay out a scenario here for a batch of episodes."""
-        return Simulation(self.model, scenario, batch, keep_out=self.outlines)
+    def simulation(
+        self,
+        scenario: Scenario,
+        batch: int,
+        memory: str = INSTANTANEOUS,
+        tracking: TrackingConfig | None = None,
+    ) -> Simulation:
+        """Lay out a scenario here for a batch of episodes; memory and tracking as in Simulation."""
+        return Simulation(
+            self.model,
+            scenario,
+            batch,
+            keep_out=self.outlines,
+            memory=memory,
+            tracking=tracking,
+        )
 
 
 def load_place(
@@ -36,8 +50,12 @@ def load_place(
     route: tuple[int, ...] | None = None,
     origin: MapOrigin | None = None,
     projector: str = "utm",
+    sensor_range_m: float = IntersectionConfig.sensor_range_m,
 ) -> Place:
     """Load an own map by its name, or an .osm file, which needs a route and an origin.
+
+    sensor_range_m: lanes reach at least so far upstream, where the map does; never less than the
+    default, so that a shorter sight does not change the roads that traffic comes along.
 
     Raises:
         ConfigurationError: a file without route. MapError, RouteError: neither can be used.
@@ -49,7 +67,9 @@ def load_place(
         path, route, origin = own.path, route or own.route, origin or own.origin
     if route is None:
         raise ConfigurationError(f"{map_name} is no own map, so its route must be given")
-    return place_on(map_name, load_map(path, origin, projector), route)
+    least_m = IntersectionConfig.sensor_range_m
+    config = IntersectionConfig(sensor_range_m=max(sensor_range_m, least_m))
+    return place_on(map_name, load_map(path, origin, projector), route, config)
 
 
 def place_on(

@@ -5,12 +5,14 @@ import hashlib
 import platform
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cache
 from importlib.metadata import version
 from typing import Any
 
 import numpy as np
 
 from risk_dqn_planner.errors import ScenarioError
+from risk_dqn_planner.intersection.config import IntersectionConfig
 from sim_bridge.environment.place import Place
 from sim_bridge.environment.seeds import TEST_SEEDS, fixed_seeds
 from sim_bridge.evaluation.cells import Cell, what_is_drawn
@@ -18,6 +20,7 @@ from sim_bridge.evaluation.rollout import Clairvoyant, Contestant, joined, roll_
 from sim_bridge.evaluation.store import Store, sources_fingerprint
 from sim_bridge.evaluation.summary import summarise
 from sim_bridge.learning.checkpoint import git_revision
+from sim_bridge.scenarios.loading import Scenario
 
 # Batches are no larger than memory and the wish to interrupt allow; results do not depend on it.
 BATCH = 500
@@ -25,11 +28,32 @@ BATCH = 500
 Advance = Callable[[int], None]
 
 
+class Places:
+    """One intersection, with lanes as long as the sensor of a scenario sees.
+
+    Scenarios that see no further than usual share one place, so that longer lanes for the others
+    change nothing for them.
+    """
+
+    def __init__(self, load: Callable[[float], Place]) -> None:
+        """Take what loads the place with lanes of a length [m] upstream."""
+        self._load = cache(load)
+        self.usual = self._load(IntersectionConfig.sensor_range_m)
+
+    def of(self, scenario: Scenario) -> Place:
+        """Return the place for a scenario.
+
+        Raises:
+            MapError, RouteError: it cannot be loaded.
+        """
+        return self._load(max(scenario.sensor.range_m, IntersectionConfig.sensor_range_m))
+
+
 @dataclass(frozen=True)
 class Campaign:
     """Where, on how many episodes of the test range, and where finished cells are kept."""
 
-    place: Place
+    places: Places
     episodes: int
     store: Store
 
@@ -42,16 +66,17 @@ class Campaign:
             ScenarioError: the cell cannot be laid out here, or has no optimum.
         """
         scenario = cell.load()
+        place = self.places.of(scenario)
         work = {
             "policy": [driver.name, driver.hash],
             "scenario": what_is_drawn(scenario),
-            "place": place_fingerprint(self.place),
+            "place": place_fingerprint(place),
             "episodes": self.episodes,
             "sources": sources_fingerprint(),
         }
         figures = self.store.get(work)
         if figures is None:
-            figures = self._drive(driver, cell, advance)
+            figures = self._drive(driver, place, scenario, advance)
             self.store.put(work, figures)
         else:
             advance(self.episodes)
@@ -59,16 +84,18 @@ class Campaign:
             "policy": driver.name,
             "policy_hash": driver.hash,
             "training_seed": driver.training_seed,
-            "map": self.place.map_name,
+            "map": place.map_name,
             "scenario": scenario.name,
             "traffic": cell.traffic,
             "sensor_range_m": scenario.sensor.range_m,
             **figures,
         }
 
-    def _drive(self, driver: Contestant, cell: Cell, advance: Advance) -> dict[str, Any]:
+    def _drive(
+        self, driver: Contestant, place: Place, scenario: Scenario, advance: Advance
+    ) -> dict[str, Any]:
         seeds = fixed_seeds(TEST_SEEDS, self.episodes)
-        simulation = self.place.simulation(cell.load(), min(BATCH, self.episodes))
+        simulation = place.simulation(scenario, min(BATCH, self.episodes))
         parts = []
         for part in roll_out(simulation, driver, seeds):
             parts.append(part)
@@ -90,18 +117,19 @@ def place_fingerprint(place: Place) -> str:
     return digest.hexdigest()
 
 
-def has_optimum(driver: Contestant, place: Place, cell: Cell) -> str:
+def has_optimum(driver: Contestant, places: Places, cell: Cell) -> str:
     """Return why a contestant cannot take part in a cell; empty if it can."""
     if not isinstance(driver, Clairvoyant):
         return ""
     try:
-        driver.drive(place.simulation(cell.load(), 1), fixed_seeds(TEST_SEEDS, 1))
+        scenario = cell.load()
+        driver.drive(places.of(scenario).simulation(scenario, 1), fixed_seeds(TEST_SEEDS, 1))
     except ScenarioError as error:
         return str(error)
     return ""
 
 
-def versions(place: Place, policies: Sequence[str]) -> dict[str, Any]:
+def versions(place: Place, drivers: Sequence[Contestant]) -> dict[str, Any]:
     """Return what the results depend on; nothing in it changes from one run to the next."""
     return {
         "git_revision": git_revision(),
@@ -110,6 +138,6 @@ def versions(place: Place, policies: Sequence[str]) -> dict[str, Any]:
         "numpy": version("numpy"),
         "numba": version("numba"),
         "map": place.map_name,
-        "policies": list(policies),
+        "policies": list(dict.fromkeys(driver.name for driver in drivers)),
         "first_seed": TEST_SEEDS.start,
     }

@@ -17,6 +17,7 @@ from risk_dqn_planner.policies.fingerprint import fingerprint
 from risk_dqn_planner.situation.situations import Booleans, Integers, Situations
 from sim_bridge.environment.seeds import Seeds
 from sim_bridge.evaluation.bounds import Bounds, Rules, lower_bounds, no_bounds, speeds_from
+from sim_bridge.evaluation.known import KnownOptima, Optimum, surroundings
 from sim_bridge.evaluation.search import GAVE_UP, IMPOSSIBLE, fastest_way
 from sim_bridge.simulation.simulation import Simulation
 from sim_bridge.simulation.state import Vehicles
@@ -90,13 +91,22 @@ def film(simulation: Simulation, seeds: Seeds) -> Vehicles:
     return vehicles._replace(driving=driving, path=path, s_m=s_m)
 
 
-def optima(simulation: Simulation, seeds: Seeds, most_states: int = MOST_STATES) -> Optima:
+def optima(
+    simulation: Simulation,
+    seeds: Seeds,
+    most_states: int = MOST_STATES,
+    known: KnownOptima | None = None,
+) -> Optima:
     """Return the fastest ways through the episodes of seeds (B,), B the simulation's batch.
+
+    known: looked up before a search, and told what was found; all with one `most_states`.
 
     Raises:
         ScenarioError: the traffic reacts to the ego.
     """
     require_indifferent(simulation)
+    known = KnownOptima() if known is None else known
+    place = surroundings(simulation)
     simulation.reset(seeds)
     start_m = simulation.state.episodes.ego_s_m.copy()
     start_mps = simulation.state.episodes.ego_speed_mps.copy()
@@ -110,8 +120,13 @@ def optima(simulation: Simulation, seeds: Seeds, most_states: int = MOST_STATES)
         at_least=np.full(batch, IMPOSSIBLE, dtype=np.int64),
     )
     for b in range(batch):
-        episode = _Episode(simulation, _frame(traffic, b), start_m[b], start_mps[b])
-        result.steps[b], result.at_least[b] = episode.solve(most_states, result.actions[b])
+        own, start = _frame(traffic, b), (float(start_m[b]), float(start_mps[b]))
+        found = known.get(place, start, simulation, own)
+        if found is None:
+            found = _Episode(simulation, own, *start).solve(most_states)
+            known.put(place, start, simulation, own, found)
+        result.steps[b], result.at_least[b] = found.steps, found.at_least
+        result.actions[b] = found.actions
     return result
 
 
@@ -138,25 +153,36 @@ class _Episode:
         self._speeds = speeds_from(self._settings.ego, self._rules, start_mps)
         self._traffic, self._start_m = traffic, start_m
 
-    def solve(self, most_states: int, actions: Integers) -> tuple[int, int]:
-        """Return inner steps to the goal and a lower bound of them, filling in actions (D,)."""
-        limit, nothing = self._rules.limit_steps, no_bounds()
+    def solve(self, most_states: int) -> Optimum:
+        """Return the fastest way, or the best one found and what no way undercuts."""
+        rules, nothing = self._rules, no_bounds()
+        limit = rules.limit_steps
+        actions = np.full(-(-limit // rules.decision_steps), int(Action.STOP), dtype=np.int64)
         steps = self._search(nothing, limit, _SAME_M, min(_EASY_STATES, most_states), actions)
         if steps != GAVE_UP:
-            return steps, steps
+            return Optimum(steps, steps, actions, self._looked(steps))
         steps = self._search(nothing, limit, _COARSE_M, most_states, actions)
         found = steps >= 0
         latest = steps - 1 if found else limit
         bounds = lower_bounds(
-            self._world.ego, self._world.paths, self._rules, self._speeds, self._traffic,
+            self._world.ego, self._world.paths, rules, self._speeds, self._traffic,
             self._start_m, latest,
         )  # fmt: skip
+        looked = self._looked(steps)
         faster = self._search(bounds, latest, _SAME_M, most_states, actions)
         if faster >= 0:
-            return faster, faster
+            return Optimum(faster, faster, actions, looked)
         steps = steps if found else IMPOSSIBLE
         at_least = int(bounds.least[0, 0, 0]) if faster == GAVE_UP else steps
-        return steps, at_least
+        return Optimum(steps, at_least, actions, looked)
+
+    def _looked(self, steps: int) -> int:
+        """Return how many inner steps of the film a search has read that ended after `steps`.
+
+        No state is followed that cannot arrive by then, and a decision's steps at most beyond it.
+        """
+        limit = self._rules.limit_steps
+        return min(steps + self._rules.decision_steps, limit) if steps >= 0 else limit
 
     def _search(
         self, bounds: Bounds, latest: int, merge_m: float, most_states: int, actions: Integers

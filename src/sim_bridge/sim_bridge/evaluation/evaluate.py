@@ -6,7 +6,6 @@ command goes on where it was. Exit code: 0 done, 2 an option is no good, 130 int
 """
 
 import argparse
-import glob
 import json
 import sys
 from collections.abc import Sequence
@@ -27,14 +26,16 @@ from rich.table import Table
 from risk_dqn_planner.errors import ConfigurationError, PlannerError
 from risk_dqn_planner.map.loader import MapOrigin
 from risk_dqn_planner.map.route import parse_route
-from sim_bridge.environment.place import Place, load_place
-from sim_bridge.evaluation.campaign import Campaign, has_optimum, versions
+from risk_dqn_planner.policies.shipped import shipped_policies
+from sim_bridge.environment.place import load_place
+from sim_bridge.evaluation.campaign import Campaign, Places, has_optimum, versions
 from sim_bridge.evaluation.cells import Cell, cells_of, paper_cells
-from sim_bridge.evaluation.rollout import Contestant, contestant
+from sim_bridge.evaluation.contestants import DEFAULT_POLICIES, contestants, named_policies
+from sim_bridge.evaluation.rollout import Contestant
 from sim_bridge.evaluation.store import Store, write_whole
+from sim_bridge.evaluation.training_runs import RUN_FOLDERS, named_runs, training_runs
 from sim_bridge.maps import map_names
 
-DEFAULT_POLICIES = ("rule_based", "always_fast", "always_slow", "clairvoyant")
 RESULTS = "results.json"
 INTERRUPTED = 130
 
@@ -53,31 +54,24 @@ def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
     add("--map", default="four_way", help=f"own map ({maps}) or an .osm file [%(default)s]")
     add("--route", help="lanelet ids, separated by commas; own maps have one")
     add("--origin", help="latitude,longitude of the map's projection [deg]")
-    add("--training", type=Path, default=Path("out/training"), help="training runs [%(default)s]")
+    add(
+        "--training",
+        type=Path,
+        nargs="*",
+        default=RUN_FOLDERS,
+        help=f"folders of training runs [{' '.join(map(str, RUN_FOLDERS))}]",
+    )
     add("--output", type=Path, default=Path("out/evaluation"), help="folder [%(default)s]")
-    add("--report", type=Path, help="also write the tables as this Markdown file")
+    add(
+        "--report", type=Path, help="also write this page, its pictures to images/results beside it"
+    )
     return parser.parse_args(argv)
 
 
-def _policies(text: str) -> list[str]:
-    """Return the names; a pattern stands for the files that match it.
-
-    Raises:
-        ConfigurationError: no file matches.
-    """
-    names: list[str] = []
-    for name in (part.strip() for part in text.split(",")):
-        found = sorted(glob.glob(name)) if "*" in name else [name]  # noqa: PTH207 (any folder)
-        if not found or not name:
-            raise ConfigurationError(f"no policy file matches '{name}'")
-        names += found
-    return names
-
-
-def _place(arguments: argparse.Namespace) -> Place:
+def _places(arguments: argparse.Namespace) -> Places:
     route = None if arguments.route is None else parse_route(arguments.route)
     origin = MapOrigin.from_text(arguments.origin) if arguments.origin else None
-    return load_place(arguments.map, route, origin)
+    return Places(lambda reach_m: load_place(arguments.map, route, origin, sensor_range_m=reach_m))
 
 
 def _run(
@@ -89,7 +83,7 @@ def _run(
 ) -> None:
     """Append the results of all drivers in all cells, showing how far it is."""
     columns = (
-        TextColumn("{task.description:<44}"),
+        TextColumn("{task.description:<52}"),
         BarColumn(bar_width=24),
         MofNCompleteColumn(),
         TimeElapsedColumn(),
@@ -98,17 +92,22 @@ def _run(
     with Progress(*columns, console=console) as progress:
         task = progress.add_task("", total=len(drivers) * len(cells) * campaign.episodes)
         for driver in drivers:
-            reason = has_optimum(driver, campaign.place, cells[0])
+            reason = has_optimum(driver, campaign.places, cells[0])
             if reason:
                 console.print(f"{driver.name} is left out: {reason}")
                 progress.advance(task, len(cells) * campaign.episodes)
                 continue
             for cell in cells:
-                label = f"{driver.name} {cell.scenario} {cell.traffic}"
+                label = f"{_called(driver)} {cell.scenario} {cell.traffic}"
                 progress.update(task, description=label)
                 results.append(
                     campaign.result(driver, cell, lambda count: progress.advance(task, count))
                 )
+
+
+def _called(driver: Contestant) -> str:
+    seed = driver.training_seed
+    return driver.name if seed is None else f"{driver.name} seed {seed}"
 
 
 def _write(folder: Path, head: dict[str, Any], results: list[dict[str, Any]]) -> None:
@@ -141,15 +140,14 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         if arguments.episodes < 1:
             raise ConfigurationError(f"episodes is {arguments.episodes}, expected 1 or more")
-        names = _policies(arguments.policies)
-        drivers = [contestant(name) for name in names]
-        place = _place(arguments)
+        drivers = contestants(named_policies(arguments.policies), arguments.training)
+        places = _places(arguments)
         cells = cells_of(arguments.scenarios.split(",")) if arguments.scenarios else paper_cells()
         for cell in cells:
             cell.load()  # a wrong name is told before hours of work
-        campaign = Campaign(place, arguments.episodes, Store(arguments.output / "cells"))
+        campaign = Campaign(places, arguments.episodes, Store(arguments.output / "cells"))
         _run(campaign, drivers, cells, console, results)
-        _write(arguments.output, versions(place, names), results)
+        _write(arguments.output, versions(places.usual, drivers), results)
         _draw(arguments, console)
     except PlannerError as error:
         print(f"error: {error}", file=sys.stderr)
@@ -165,14 +163,21 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _draw(arguments: argparse.Namespace, console: Console) -> None:
     """Draw the figures and write the report from results.json."""
     # Matplotlib takes a second to load, too long for --help.
-    from sim_bridge.evaluation.figures import draw_figures  # noqa: PLC0415
-    from sim_bridge.evaluation.report import write_report  # noqa: PLC0415
+    from sim_bridge.evaluation.reporting.curves import curves_of  # noqa: PLC0415
+    from sim_bridge.evaluation.reporting.figures import draw_figures  # noqa: PLC0415
+    from sim_bridge.evaluation.reporting.page import PICTURES, write_report  # noqa: PLC0415
 
     content = json.loads((arguments.output / RESULTS).read_text(encoding="utf-8"))
-    for path in draw_figures(content["cells"], arguments.training, arguments.output):
+    lines = content["cells"]
+    found = training_runs(arguments.training)
+    named = named_runs(found, shipped_policies().values()) if found else {}
+    evaluated = {line["policy"] for line in lines}
+    curves = curves_of({name: each for name, each in named.items() if name in evaluated})
+    for path in draw_figures(lines, curves, arguments.output):
         console.print(f"{path}")
     if arguments.report:
-        write_report(content, arguments.output, arguments.report)
+        pictures = draw_figures(lines, curves, arguments.report.parent / PICTURES)
+        write_report(content, curves, pictures, arguments.report)
         console.print(f"{arguments.report}")
 
 

@@ -1,18 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """Drives many episodes in batches; every contestant gets the same ones."""
 
-from collections.abc import Iterator, Mapping
-from typing import Any, NamedTuple, Protocol
+from collections.abc import Iterator
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from risk_dqn_planner.policies.base import Policy
-from risk_dqn_planner.policies.loading import load_policy
 from sim_bridge.environment.episodes import DrivenEpisodes, drive
 from sim_bridge.environment.seeds import Seeds
 from sim_bridge.evaluation.clairvoyant import NAME as CLAIRVOYANT
 from sim_bridge.evaluation.clairvoyant import ClairvoyantPolicy, optima
+from sim_bridge.evaluation.known import KnownOptima
 from sim_bridge.simulation.simulation import EpisodeStatistics, Simulation
 
 
@@ -43,16 +43,14 @@ class Contestant(Protocol):
 
 
 class PolicyContestant:
-    """Any policy."""
+    """Any policy, by its own name unless it is given another one."""
 
-    def __init__(self, policy: Policy, training_seed: int | None = None) -> None:
+    def __init__(
+        self, policy: Policy, training_seed: int | None = None, name: str | None = None
+    ) -> None:
         self._policy = policy
         self.training_seed = training_seed
-
-    @property
-    def name(self) -> str:
-        """Name of the policy."""
-        return self._policy.name
+        self.name = name or policy.name
 
     @property
     def hash(self) -> str:
@@ -70,6 +68,9 @@ class Clairvoyant:
     name = CLAIRVOYANT
     training_seed = None
 
+    def __init__(self) -> None:
+        self._known = KnownOptima()
+
     @property
     def hash(self) -> str:
         """SHA-256 of the name."""
@@ -81,31 +82,9 @@ class Clairvoyant:
         Raises:
             ScenarioError: the traffic reacts to the ego.
         """
-        found = optima(simulation, seeds)
+        found = optima(simulation, seeds, known=self._known)
         episodes = drive(simulation, ClairvoyantPolicy(found.actions), seeds)
         return Driven(episodes, found.proven)
-
-
-def contestant(name: str) -> Contestant:
-    """Return what a name stands for: `clairvoyant`, or any name that `load_policy` takes.
-
-    Raises:
-        PolicyError: the name stands for nothing that can be used.
-    """
-    if name == CLAIRVOYANT:
-        return Clairvoyant()
-    policy = load_policy(name)
-    return PolicyContestant(policy, _training_seed(name) if name.endswith(".pt") else None)
-
-
-def _training_seed(path: str) -> int | None:
-    # Only policy files need torch, which takes seconds to load.
-    from risk_dqn_planner.policies.policy_file import load_policy_file  # noqa: PLC0415
-
-    training = load_policy_file(path).contract.get("training", {})
-    run = training.get("run", {}) if isinstance(training, Mapping) else {}
-    seed: Any = run.get("seed")
-    return seed if isinstance(seed, int) else None
 
 
 def roll_out(simulation: Simulation, driver: Contestant, seeds: Seeds) -> Iterator[Driven]:

@@ -17,7 +17,7 @@ import sim_bridge
 from risk_dqn_planner.policies.fingerprint import fingerprint
 
 # What only draws, prints or talks to ROS decides nothing.
-_BESIDE_THE_POINT = ("ros", "figures.py", "report.py", "evaluate.py", "__pycache__")
+_BESIDE_THE_POINT = ("ros", "reporting", "evaluate.py", "contestants.py", "__pycache__")
 
 
 @cache

@@ -13,6 +13,7 @@ from sim_bridge.environment.interface import Outcome
 from sim_bridge.evaluation import clairvoyant
 from sim_bridge.evaluation.bounds import Rules, lower_bounds, speeds_from
 from sim_bridge.evaluation.clairvoyant import ClairvoyantPolicy, Optima, film, optima
+from sim_bridge.evaluation.known import KnownOptima
 from sim_bridge.evaluation.search import IMPOSSIBLE
 from sim_bridge.scenarios.fields import EgoStart, Interval, Obstacles, Timing
 from sim_bridge.scenarios.loading import Scenario
@@ -119,6 +120,38 @@ def test_the_simulation_drives_the_optimum_in_exactly_its_time(
     driven = drive(simulation, ClairvoyantPolicy(found.actions), seeds)
     assert (driven.outcome == Outcome.SUCCESS).all()
     np.testing.assert_allclose(driven.statistics.duration_s, found.steps * 0.1, atol=1e-9)
+
+
+def test_what_the_ego_perceives_or_what_comes_late_is_not_searched_again(
+    crossing_model: IntersectionModel, busy: Scenario, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    known, seeds = KnownOptima(), np.arange(12)
+    first = optima(Simulation(crossing_model, busy, 12), seeds, known=known)
+    ended = replace(busy, traffic=replace(busy.traffic, respawn=not busy.traffic.respawn))
+    noisy = replace(busy, sensor=replace(busy.sensor, range_m=30.0, velocity_noise_mps=1.0))
+    expected = [optima(Simulation(crossing_model, each, 12), seeds) for each in (ended, noisy)]
+
+    def refuse(*_: object) -> None:
+        raise AssertionError("this episode was searched before")
+
+    monkeypatch.setattr(clairvoyant, "fastest_way", refuse)
+    for scenario, fresh in zip((ended, noisy), expected, strict=True):
+        again = optima(Simulation(crossing_model, scenario, 12), seeds, known=known)
+        for one, other in zip(again, fresh, strict=True):
+            np.testing.assert_array_equal(one, other)
+    assert (first.steps > 0).all()
+
+
+def test_other_traffic_from_the_same_start_is_searched_anew(
+    crossing_model: IntersectionModel, busy: Scenario
+) -> None:
+    known, seeds = KnownOptima(), np.arange(12)
+    slow = replace(busy, traffic=replace(busy.traffic, desired_speed_mps=Interval(2.0, 3.0)))
+    optima(Simulation(crossing_model, busy, 12), seeds, known=known)
+    after = optima(Simulation(crossing_model, slow, 12), seeds, known=known)
+    np.testing.assert_array_equal(
+        after.steps, optima(Simulation(crossing_model, slow, 12), seeds).steps
+    )
 
 
 def test_without_room_for_a_proof_it_says_what_is_known(

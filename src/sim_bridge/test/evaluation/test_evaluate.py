@@ -5,9 +5,14 @@ from typing import Any
 
 import pytest
 
+from sim_bridge.environment import place as place_module
+from sim_bridge.environment.place import Place, load_place
 from sim_bridge.evaluation import campaign, evaluate
+from sim_bridge.evaluation.campaign import Places
 from sim_bridge.evaluation.cells import FINITE, RESPAWNING, Cell, paper_cells, what_is_drawn
-from sim_bridge.evaluation.paper_values import paper_role
+from sim_bridge.evaluation.reporting.paper_values import paper_role
+
+from .policy_runs import a_run
 
 OPTIONS = ["--episodes", "20", "--policies", "rule_based,always_fast", "--scenarios", "base"]
 
@@ -79,18 +84,64 @@ def test_the_report_holds_the_numbers(tmp_path: Path) -> None:
     content = run(tmp_path, "--report", str(tmp_path / "docs" / "results.md"))
     text = (tmp_path / "docs" / "results.md").read_text()
     success = 100 * content["cells"][2]["success"]["rate"]
+    assert f"| always_fast | {success:.1f} / " in text
     assert f"| always_fast | {success:.1f} [" in text
-    assert "](../action_usage.png)" in text
+    assert "](images/results/action_usage.png)" in text
+    assert (tmp_path / "docs" / "images" / "results" / "action_usage.png").stat().st_size > 0
 
 
-def test_training_runs_are_drawn(tmp_path: Path) -> None:
+@pytest.mark.filterwarnings("ignore:.*torch.jit:DeprecationWarning")
+def test_each_seed_of_a_training_has_its_lines_and_all_are_drawn(tmp_path: Path) -> None:
     for seed in (0, 1):
-        folder = tmp_path / "runs" / f"risk_paper_seed{seed}"
-        folder.mkdir(parents=True)
-        records = [{"steps": k * 100, "evaluation": {"success": k / 10}} for k in range(10)]
-        (folder / "history.json").write_text(json.dumps(records))
-    run(tmp_path)
+        folder = tmp_path / "runs" / f"mine_seed{seed}"
+        a_run(folder, seed, name="mine", weights=seed, success=[0.0, 0.5, 1.0])
+    content = run(tmp_path, "--policies", f"{tmp_path}/runs/*/policy.pt")
+    assert [line["policy"] for line in content["cells"]] == ["mine"] * 4
+    assert [line["training_seed"] for line in content["cells"]] == [0, 0, 1, 1]
+    assert content["versions"]["policies"] == ["mine"]
     assert (tmp_path / "success_during_training.png").stat().st_size > 0
+
+
+def test_every_line_holds_what_the_format_promises(tmp_path: Path) -> None:
+    share, mean = {"rate", "low", "high"}, {"mean", "low", "high"}
+    for line in run(tmp_path)["cells"]:
+        for name in ("policy", "scenario", "traffic"):
+            assert isinstance(line[name], str)
+        assert line["training_seed"] is None
+        assert line["sensor_range_m"] == 70.0
+        assert line["episodes"] == 20
+        for name in ("success", "collision", "timeout", "hard_brake_share"):
+            assert line[name].keys() == share
+        assert {action: value.keys() for action, value in line["action_share"].items()} == (
+            dict.fromkeys(("stop", "slow", "fast"), share)
+        )
+        for name in ("mean_speed_mps", "crossing_time_s", "switches_per_episode"):
+            assert line[name].keys() == mean
+        assert line["min_time_gap_s"].keys() == mean | {"worst", "episodes"}
+
+
+def test_lanes_reach_as_far_as_the_sensor_of_a_cell_and_no_other_cell_is_touched() -> None:
+    asked: list[float] = []
+
+    def load(sensor_range_m: float) -> Place:
+        asked.append(sensor_range_m)
+        return load_place("four_way", sensor_range_m=sensor_range_m)
+
+    places = Places(load)
+    chosen = {cell: places.of(cell.load()) for cell in paper_cells()}
+    assert asked == [70.0, 90.0]
+    for cell, place in chosen.items():
+        assert (place is places.usual) == (cell.sensor_range_m != 90.0)
+
+
+@pytest.mark.parametrize(("sensor_range_m", "reach_m"), [(40.0, 70.0), (70.0, 70.0), (90.0, 90.0)])
+def test_a_place_is_built_for_at_least_the_usual_range(
+    sensor_range_m: float, reach_m: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    built = []
+    monkeypatch.setattr(place_module, "place_on", lambda *given: built.append(given[-1]))
+    load_place("four_way", sensor_range_m=sensor_range_m)
+    assert [config.sensor_range_m for config in built] == [reach_m]
 
 
 def test_the_clairvoyant_is_left_out_where_traffic_reacts(

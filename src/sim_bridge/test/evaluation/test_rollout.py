@@ -2,10 +2,10 @@
 import numpy as np
 import pytest
 
-from risk_dqn_planner.errors import PolicyError
 from risk_dqn_planner.intersection.model import IntersectionModel
 from sim_bridge.environment.interface import Outcome
-from sim_bridge.evaluation.rollout import Driven, contestant, joined, roll_out
+from sim_bridge.evaluation.contestants import contestants
+from sim_bridge.evaluation.rollout import Driven, joined, roll_out
 from sim_bridge.evaluation.summary import summarise
 from sim_bridge.scenarios.loading import Scenario
 from sim_bridge.simulation.simulation import Simulation
@@ -14,7 +14,8 @@ SEEDS = np.arange(50)
 
 
 def rolled_out(model: IntersectionModel, scenario: Scenario, name: str, batch: int) -> Driven:
-    return joined(list(roll_out(Simulation(model, scenario, batch), contestant(name), SEEDS)))
+    (driver,) = contestants([name])
+    return joined(list(roll_out(Simulation(model, scenario, batch), driver, SEEDS)))
 
 
 @pytest.mark.parametrize("name", ["rule_based", "clairvoyant"])
@@ -61,8 +62,3 @@ def test_what_never_happened_has_no_figure(
     assert figures["timeout"]["rate"] == 1.0
     assert figures["crossing_time_s"] is None
     assert figures["min_time_gap_s"] is None
-
-
-def test_an_unknown_policy_is_named() -> None:
-    with pytest.raises(PolicyError, match="'nobody'"):
-        contestant("nobody")

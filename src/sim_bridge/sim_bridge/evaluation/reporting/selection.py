@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Picks lines of results.json, and averages policies that differ in their training seed only."""
 
+import math
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from typing import Any, NamedTuple
@@ -11,7 +12,7 @@ Line = dict[str, Any]
 
 
 class Spread(NamedTuple):
-    """Mean over training seeds with the interval: of the one seed, or lowest and highest seed."""
+    """Mean over training seeds, and what encloses the 95% intervals of all of them."""
 
     value: float
     low: float
@@ -63,23 +64,44 @@ def spread(lines: Sequence[Line], read: Callable[[Line], Line | None]) -> Spread
     if not found:
         return None
     centers = [float(value["rate"] if "rate" in value else value["mean"]) for value in found]
-    mean = sum(centers) / len(centers)
-    if len(found) == 1:
-        return Spread(mean, found[0]["low"], found[0]["high"], 1)
-    return Spread(mean, min(centers), max(centers), len(found))
+    lows, highs = ([float(value[end]) for value in found] for end in ("low", "high"))
+    return Spread(sum(centers) / len(centers), min(lows), max(highs), len(found))
 
 
-def actions_normalised(lines: Sequence[Line], reference: Sequence[Line]) -> dict[str, float]:
+def actions_normalised(lines: Sequence[Line], reference: Sequence[Line]) -> dict[str, Spread]:
     """Return the number of actions of each kind over that of the reference (paper, figure 7).
 
-    An action that the reference never takes is left out: there is nothing to divide by.
+    An action that the reference never takes is left out: there is nothing to divide by. The
+    intervals take both numbers for independent, which errs on the wide side.
     """
     result = {}
     for action in ("fast", "slow", "stop"):
-        counts, ours = (
-            [line["actions_per_episode"][action]["mean"] for line in group]
-            for group in (reference, lines)
+        theirs, ours = (
+            [line["actions_per_episode"][action] for line in group] for group in (reference, lines)
         )
-        if counts and ours and sum(counts) > 0.0:
-            result[action] = (sum(ours) / len(ours)) / (sum(counts) / len(counts))
+        base = sum(value["mean"] for value in theirs)
+        if not theirs or not ours or base <= 0.0:
+            continue
+        ratios = [value["mean"] * len(theirs) / base for value in ours]
+        # The reference itself is 1 by definition.
+        errors = [
+            0.0 if ours == theirs else math.hypot(_relative(value), _relative(theirs[0]))
+            for value in ours
+        ]
+        ends = [
+            (ratio * max(1.0 - error, 0.0), ratio * (1.0 + error))
+            for ratio, error in zip(ratios, errors, strict=True)
+        ]
+        result[action] = Spread(
+            sum(ratios) / len(ratios),
+            min(low for low, _ in ends),
+            max(high for _, high in ends),
+            len(ours),
+        )
     return result
+
+
+def _relative(value: Line) -> float:
+    """Return half the interval of a mean, relative to it."""
+    mean = float(value["mean"])
+    return (float(value["high"]) - mean) / mean if mean > 0.0 else 0.0

@@ -12,6 +12,7 @@ import tempfile
 from collections.abc import Sequence
 from contextlib import closing
 from pathlib import Path
+from typing import NamedTuple
 
 from risk_dqn_planner.errors import PlannerError
 from risk_dqn_planner.policies.shipped import DEFAULT_POLICY
@@ -24,17 +25,27 @@ from sim_bridge.ros.summary import episode_result
 from sim_bridge.ros.topics import DECISION, INPUTS
 
 _TOPICS = (*INPUTS, DECISION)
-_DEFAULT_SEED = 0
 _KEPT_AFTER_DECISION_NS = (0, 300_000_000)
 _TRAINED_MAP = "four_way"
+_TRAINED_SEED = 3  # an episode in which all three actions are taken
 
 
-def bags() -> dict[str, RunSettings]:
+class Recording(NamedTuple):
+    """What is driven in a bag: one episode, by its seed."""
+
+    settings: RunSettings
+    seed: int
+
+
+def bags() -> dict[str, Recording]:
     """Return what is driven in each bag, by the bag's name."""
     trained = f"{_TRAINED_MAP}_{DEFAULT_POLICY}"
     return {
-        **{name: own_map_settings(name, "rule_based", "demo_light") for name in map_names()},
-        trained: own_map_settings(_TRAINED_MAP),
+        **{
+            name: Recording(own_map_settings(name, "rule_based", "demo_light"), 0)
+            for name in map_names()
+        },
+        trained: Recording(own_map_settings(_TRAINED_MAP), _TRAINED_SEED),
     }
 
 
@@ -73,7 +84,7 @@ def record(settings: RunSettings, seed: int, target: Path) -> str:
 def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="record", description=__doc__)
     parser.add_argument("--bag", choices=list(bags()), help="only this one [all]")
-    parser.add_argument("--seed", type=int, default=_DEFAULT_SEED, help="[%(default)s]")
+    parser.add_argument("--seed", type=int, help="of the episode [the bag's own]")
     parser.add_argument(
         "--folder", type=Path, default=Path("bags"), help="where the bags go [%(default)s]"
     )
@@ -84,10 +95,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run the command."""
     arguments = _arguments(argv)
     try:
-        for name, settings in bags().items():
+        for name, (settings, own_seed) in bags().items():
             if arguments.bag not in (None, name):
                 continue
-            went = record(settings, arguments.seed, arguments.folder / name)
+            seed = own_seed if arguments.seed is None else arguments.seed
+            went = record(settings, seed, arguments.folder / name)
             size_kb = sum(f.stat().st_size for f in (arguments.folder / name).iterdir()) / 1000.0
             print(f"{arguments.folder / name}: {went}, {size_kb:.0f} kB")
     except PlannerError as error:

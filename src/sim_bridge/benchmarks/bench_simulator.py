@@ -1,23 +1,26 @@
 # SPDX-License-Identifier: Apache-2.0
 """Decision steps a second of the batched simulator on one core, and what they are spent on.
 
-Run as `python benchmarks/bench_simulator.py [--map NAME] [--curves] [--json FILE]`. Random actions
-on the scenario `base` with a fixed number of vehicles; ended episodes are replaced at once, which
-is counted. The first round, which compiles, is not. Processor time is measured, and the median and
-the best of the rounds given: on a busy computer the best is nearer to what the code costs.
+Run as `python benchmarks/bench_simulator.py [--map NAME] [--curves] [--json FILE]
+[--picture FILE]`. Random actions on the scenario `base` with a fixed number of vehicles; ended
+episodes are replaced at once, which is counted. The first round, which compiles, is not.
+Processor time is measured, and the median and the best of the rounds given: on a busy computer the
+best is nearer to what the code costs.
 """
 
 import argparse
 import json
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from risk_dqn_planner.risk.risk import RiskConfig, assess
@@ -29,6 +32,8 @@ from sim_bridge.scenarios.loading import load_scenario
 
 PARTS = ("step", "situations", "risk", "encoding", "reset")
 ROUNDS, STEPS = 10, 60
+# The map with the most lanes, to show what each of them costs.
+LANES_MAP = "multi_lane"
 
 
 class Load(NamedTuple):
@@ -121,7 +126,73 @@ def cost_of(place: Place, load: Load) -> Cost:
 def line(name: str, cost: Cost) -> str:
     """Return a row of the table."""
     parts = "".join(f"{cost.parts[part]:>12.0f}" for part in PARTS)
-    return f"{name:<28}{parts}{cost.median:>10.0f}{cost.best:>8.0f}{cost.steps_per_s:>14,.0f}"
+    return f"{name:<36}{parts}{cost.median:>10.0f}{cost.best:>8.0f}{cost.steps_per_s:>14,.0f}"
+
+
+class Case(NamedTuple):
+    """One load on a map, of which the first `lanes` intersecting lanes are taken."""
+
+    map: str
+    lanes: int
+    load: Load
+    cost: Cost
+
+    def figures(self) -> dict[str, Any]:
+        """Return the case as it is written to a file."""
+        cost = self.cost
+        known = {"map": self.map, "lanes": self.lanes, **self.load._asdict()}
+        return {**known, **cost._asdict(), "steps_per_s": cost.steps_per_s}
+
+
+def measured(map_name: str, load: Load, lanes: int | None = None) -> Case:
+    """Measure a load and print its row of the table; `lanes`: that many of the map's only."""
+    place = load_place(map_name)
+    place = replace(place, model=replace(place.model, lanes=place.model.lanes[:lanes]))
+    case = Case(map_name, len(place.model.lanes), load, cost_of(place, load))
+    name = f"{map_name} {case.lanes} lanes, {load.vehicles} veh., batch {load.batch}"
+    sys.stdout.write(line(name, case.cost) + "\n")
+    sys.stdout.flush()
+    return case
+
+
+def curves(map_name: str) -> Iterator[Case]:
+    """Measure by vehicles, by maps, by lanes of one map, and by batch."""
+    yield from (measured(map_name, Load(vehicles=count)) for count in (0, 2, 4, 16, 24, 32))
+    yield from (measured(name, Load()) for name in map_names() if name != map_name)
+    most = len(load_place(LANES_MAP).model.lanes)
+    yield from (measured(LANES_MAP, Load(), lanes) for lanes in range(1, most))
+    yield from (measured(map_name, Load(batch=batch)) for batch in (1, 16, 128, 4096))
+
+
+def draw_curves(cases: Sequence[Case], file: Path) -> None:
+    """Draw the cost by vehicles on the first case's map, and by lanes of one map."""
+    first = cases[0]
+    usual = [case for case in cases if case.load.batch == first.load.batch]
+    by_vehicles = [c for c in usual if c.map == first.map and c.lanes == first.lanes]
+    by_lanes = [c for c in usual if c.map == LANES_MAP and c.load == first.load]
+    figure = Figure(figsize=(10, 4), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    draw_curve(left, [case.load.vehicles for case in by_vehicles], by_vehicles, "vehicle")
+    left.set_title(f"{first.map}, {first.lanes} lanes")
+    draw_curve(right, [case.lanes for case in by_lanes], by_lanes, "lane")
+    right.set_title(f"The first lanes of {LANES_MAP}, {first.load.vehicles} vehicles")
+    figure.suptitle(f"One core, batch of {first.load.batch}")
+    file.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(file, dpi=120)
+
+
+def draw_curve(axes: Axes, at: Sequence[int], cases: Sequence[Case], unit: str) -> None:
+    """Draw the median cost of cases at their number of units, with the straight line through."""
+    cost = np.array([case.cost.median for case in cases]) * 1e-3
+    axes.plot(at, cost, "o", label="measured, median of rounds")
+    if len(set(at)) > 1:
+        slope, start = np.polyfit(at, cost, 1)
+        ends = np.array([0, max(at)])
+        axes.plot(ends, start + slope * ends, label=f"{start:.2f} + {slope:.3f} per {unit}")
+    axes.set(xlabel=f"{unit}s", ylabel="microseconds a decision step", xlim=(0, None))
+    axes.set_ylim(0, None)
+    axes.grid(visible=True, alpha=0.3)
+    axes.legend()
 
 
 def main() -> None:
@@ -130,26 +201,21 @@ def main() -> None:
     parser.add_argument("--map", default="four_way", choices=map_names(), dest="map_name")
     parser.add_argument("--curves", action="store_true", help="also by vehicles, maps and batch")
     parser.add_argument("--json", type=Path, help="write the figures to this file")
+    parser.add_argument("--picture", type=Path, help="draw the curves to this file")
     options = parser.parse_args()
-    cases = [(options.map_name, Load())]
-    if options.curves:
-        cases += [(options.map_name, Load(vehicles=count)) for count in (0, 2, 4, 16, 32)]
-        cases += [(name, Load()) for name in map_names() if name != options.map_name]
-        cases += [(options.map_name, Load(batch=batch)) for batch in (1, 16, 128, 4096)]
+    if options.picture and not options.curves:
+        parser.error("--picture draws what --curves measures; give both")
     heads = "".join(f"{part:>12}" for part in PARTS)
-    sys.stdout.write(f"{'ns a decision step':<28}{heads}{'median':>10}{'best':>8}{'steps/s':>14}\n")
-    figures = []
-    for map_name, load in cases:
-        place = load_place(map_name)
-        cost = cost_of(place, load)
-        lanes = len(place.model.lanes)
-        name = f"{map_name}, {load.vehicles} veh., batch {load.batch}"
-        sys.stdout.write(line(name, cost) + "\n")
-        case = {"map": map_name, "lanes": lanes, **load._asdict(), **cost._asdict()}
-        figures.append({**case, "steps_per_s": cost.steps_per_s})
+    sys.stdout.write(f"{'ns a decision step':<36}{heads}{'median':>10}{'best':>8}{'steps/s':>14}\n")
+    cases = [measured(options.map_name, Load())]
+    if options.curves:
+        cases += curves(options.map_name)
     if options.json:
         options.json.parent.mkdir(parents=True, exist_ok=True)
-        options.json.write_text(json.dumps(figures, indent=2) + "\n", encoding="utf-8")
+        text = json.dumps([case.figures() for case in cases], indent=2)
+        options.json.write_text(text + "\n", encoding="utf-8")
+    if options.picture:
+        draw_curves(cases, options.picture)
 
 
 if __name__ == "__main__":

@@ -11,16 +11,14 @@ from risk_dqn_planner.situation.paths import PathTable
 from risk_dqn_planner.situation.situations import Floats
 
 
-@kernel
-def bounds_kernel(table: PathTable, p: int, sensor_range: float) -> tuple[float, float]:
-    """Return between which distances to its zone's centre a path is looked at: exit and end.
+def looked_at(table: PathTable, sensor_range_m: float) -> tuple[Floats, Floats]:
+    """Return the distances (P,) between which paths are looked at: the zone's exit and the end.
 
     The end is the sensor's range, or where the map's lanes begin if that is nearer.
     """
-    center = table.zone_center_m[p]
-    length = table.s[table.first[p + 1] - 1]
-    exit_m = center - min(center + 0.5 * table.zone_m[p], length)
-    return exit_m, max(min(sensor_range, center), exit_m)
+    center = table.zone_center_m
+    exit_m = center - np.minimum(center + 0.5 * table.zone_m, table.s[table.first[1:] - 1])
+    return exit_m, np.maximum(np.minimum(sensor_range_m, center), exit_m)
 
 
 @kernel
@@ -36,7 +34,7 @@ def hidden_pieces_kernel(
 ) -> int:
     """Write what a polygon (K, 2) does not show of path p as a set of distances; see `intervals`.
 
-    From exit_m to end_m to the zone's centre, in row 0 of near and far; returns how many
+    From exit_m to end_m to the zone's centre, in row p of near and far; returns how many
     intervals. What is nearer than margin_m to a hidden place along the path counts as hidden.
     """
     cuts: Floats = np.empty(2 * polygon.shape[0] + 1)
@@ -64,7 +62,7 @@ def hidden_pieces_kernel(
                 if not seen and cut > begin:
                     nearest = center - high + begin * (high - low) - margin_m
                     furthest = center - high + cut * (high - low) + margin_m
-                    count = insert(near, far, 0, count, max(nearest, exit_m), min(furthest, end_m))
+                    count = insert(near, far, p, count, max(nearest, exit_m), min(furthest, end_m))
                 begin = cut
         k -= 1
     return count

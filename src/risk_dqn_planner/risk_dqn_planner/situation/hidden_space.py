@@ -20,9 +20,10 @@ from risk_dqn_planner.compiled import kernel
 from risk_dqn_planner.situation.intervals import insert, intersect
 from risk_dqn_planner.situation.situations import Booleans, Floats, Integers
 
-# Intervals kept for each path, and for what is in the making while a path is updated.
-INTERVALS = 6
-_WORK_INTERVALS = 16
+# Intervals kept for each path, and for what is in the making while a path is updated: all that
+# were kept, one from beyond the end, and some for lost vehicles.
+INTERVALS = 8
+_WORK_INTERVALS = 2 * INTERVALS
 # Growth is rounded up by this.
 _ROUNDING_M = 1e-6
 
@@ -49,14 +50,16 @@ class HiddenSpace(NamedTuple):
 
 
 class HiddenWork(NamedTuple):
-    """Memory to work in. hidden_near_m, hidden_far_m (1, W + 1): the set of what is hidden now.
+    """What is in the making while the sets of one episode are updated.
 
+    hidden_near_m, hidden_far_m (P, W + 1) and hidden (P,): the sets of what is hidden now.
     grown_near_m, grown_far_m (1, W + 1): where hidden vehicles may have got to. Lost vehicles, all
     (N,): lost_lane, lost_near_m, lost_far_m.
     """
 
     hidden_near_m: Floats
     hidden_far_m: Floats
+    hidden: Integers
     grown_near_m: Floats
     grown_far_m: Floats
     lost_lane: Integers
@@ -79,14 +82,15 @@ def empty_hidden_space(batch: int, paths: int, vehicles: int) -> HiddenSpace:
     )
 
 
-def hidden_work(vehicles: int) -> HiddenWork:
-    """Return memory to work in for up to so many seen vehicles."""
-    row = (1, _WORK_INTERVALS + 1)
+def hidden_work(paths: int, vehicles: int) -> HiddenWork:
+    """Return memory to work in for so many paths and up to so many seen vehicles."""
+    width = _WORK_INTERVALS + 1
     return HiddenWork(
-        hidden_near_m=np.zeros(row),
-        hidden_far_m=np.zeros(row),
-        grown_near_m=np.zeros(row),
-        grown_far_m=np.zeros(row),
+        hidden_near_m=np.zeros((paths, width)),
+        hidden_far_m=np.zeros((paths, width)),
+        hidden=np.zeros(paths, dtype=np.int64),
+        grown_near_m=np.zeros((1, width)),
+        grown_far_m=np.zeros((1, width)),
         lost_lane=np.zeros(vehicles, dtype=np.int64),
         lost_near_m=np.zeros(vehicles),
         lost_far_m=np.zeros(vehicles),
@@ -120,9 +124,16 @@ def still_seen(id_: int, guess: int, mask: Booleans, ids: Integers, b: int) -> b
     return False
 
 
+# Kernels below take the fields of named tuples one by one: reading them inside of a loop costs a
+# count of references each time.
+
+
 @kernel
 def find_lost(
-    space: HiddenSpace,
+    seen: Integers,
+    seen_id: Integers,
+    seen_lane: Integers,
+    seen_distance_m: Floats,
     b: int,
     mask: Booleans,
     ids: Integers,
@@ -130,49 +141,117 @@ def find_lost(
     fastest_mps: Floats,
     slowest_mps: float,
     margin_m: float,
-    work: HiddenWork,
+    lost_lane: Integers,
+    lost_near_m: Floats,
+    lost_far_m: Floats,
 ) -> int:
     """Fill in where vehicles that are no longer seen may have got to; return how many pairs.
 
-    mask, ids (B, N): the pairs seen now. fastest_mps (M,): of hidden vehicles on each lane.
-    margin_m: how far from its place a vehicle may have been. None after an endless time: then
-    hidden vehicles may be anywhere.
+    seen, ...: of HiddenSpace; mask, ids (B, N): the pairs seen now; fastest_mps (M,): of hidden
+    vehicles on each lane; margin_m: how far from its place a vehicle may have been; lost_lane, ...:
+    of HiddenWork. None after an endless time: then hidden vehicles may be anywhere.
     """
     count = 0
-    before = space.seen[b] if elapsed_s < math.inf else 0
+    before = seen[b] if elapsed_s < math.inf else 0
     for k in range(before):
-        if still_seen(space.seen_id[b, k], k, mask, ids, b):
+        if still_seen(seen_id[b, k], k, mask, ids, b):
             continue
-        lane, distance = space.seen_lane[b, k], space.seen_distance_m[b, k]
-        work.lost_lane[count] = lane
-        work.lost_near_m[count] = distance - fastest_mps[lane] * elapsed_s - margin_m
-        work.lost_far_m[count] = distance - slowest_mps * elapsed_s + margin_m
+        lane, distance = seen_lane[b, k], seen_distance_m[b, k]
+        lost_lane[count] = lane
+        lost_near_m[count] = distance - fastest_mps[lane] * elapsed_s - margin_m
+        lost_far_m[count] = distance - slowest_mps * elapsed_s + margin_m
         count += 1
     return count
 
 
 @kernel
 def carry_on(
-    space: HiddenSpace,
+    near_m: Floats,
+    far_m: Floats,
+    held: Integers,
+    b: int,
+    lane_of: Integers,
+    exit_m: Floats,
+    end_m: Floats,
+    elapsed_s: float,
+    fastest_mps: Floats,
+    slowest_mps: float,
+    lost_lane: Integers,
+    lost_near_m: Floats,
+    lost_far_m: Floats,
+    lost: int,
+    hidden_near_m: Floats,
+    hidden_far_m: Floats,
+    hidden: Integers,
+    grown_near_m: Floats,
+    grown_far_m: Floats,
+    nearest_m: Floats,
+) -> None:
+    """Bring the sets of episode b to the present; lower nearest_m (B, M) to their places.
+
+    near_m, far_m, held: of HiddenSpace. lane_of (P,): index into the M lanes; exit_m, end_m (P,):
+    distances between which paths are looked at, the zone's exit and the end; fastest_mps (M,).
+    lost: pairs in lost_lane, ...; these and what is hidden now are of HiddenWork.
+    """
+    paths = len(lane_of)
+    for p in range(paths):
+        row, lane, end = b * paths + p, lane_of[p], end_m[p]
+        if hidden[p] == 0:
+            held[row] = 0
+            continue
+        count = _grow(
+            near_m,
+            far_m,
+            held[row],
+            row,
+            exit_m[p],
+            end,
+            elapsed_s,
+            fastest_mps[lane],
+            slowest_mps,
+            grown_near_m,
+            grown_far_m,
+        )
+        for k in range(lost):
+            low, high = max(lost_near_m[k], exit_m[p]), min(lost_far_m[k], end)
+            if lost_lane[k] == lane and low <= high:
+                count = insert(grown_near_m, grown_far_m, 0, count, low, high)
+        held[row] = intersect(
+            grown_near_m,
+            grown_far_m,
+            0,
+            count,
+            hidden_near_m,
+            hidden_far_m,
+            p,
+            hidden[p],
+            near_m,
+            far_m,
+            row,
+        )
+        if held[row] > 0:
+            nearest_m[b, lane] = min(nearest_m[b, lane], near_m[row, 0])
+
+
+@kernel
+def _grow(
+    near_m: Floats,
+    far_m: Floats,
+    held: int,
     row: int,
-    lane: int,
     exit_m: float,
     end_m: float,
     elapsed_s: float,
     fastest_mps: float,
     slowest_mps: float,
-    lost: int,
-    hidden: int,
-    work: HiddenWork,
-) -> float:
-    """Bring the set of one path to the present; return its nearest distance, infinity if empty.
+    grown_near_m: Floats,
+    grown_far_m: Floats,
+) -> int:
+    """Write where the vehicles of a set may have got to, and those from beyond the end.
 
-    exit_m, end_m: distances between which the path is looked at, the zone's exit and the end.
-    lost: pairs in `work`; hidden: intervals in `work`, of what is hidden now.
+    Returns how many intervals. They ascend, but may overlap.
     """
-    near, far = work.grown_near_m, work.grown_far_m
-    ahead, behind = 0.0, 0.0
-    before = space.held[row]
+    ahead, behind, before = 0.0, 0.0, held
     if elapsed_s == math.inf:
         ahead, before = math.inf, 0
     elif elapsed_s > 0.0:
@@ -180,47 +259,33 @@ def carry_on(
         behind = max(slowest_mps * elapsed_s - _ROUNDING_M, 0.0)
     count = 0
     for k in range(before):
-        low, high = space.near_m[row, k] - ahead, space.far_m[row, k] - behind
+        high = far_m[row, k] - behind
         if high >= exit_m:
-            count = insert(near, far, 0, count, max(low, exit_m), high)
-    count = insert(near, far, 0, count, max(end_m - ahead, exit_m), end_m)
-    for k in range(lost):
-        low, high = max(work.lost_near_m[k], exit_m), min(work.lost_far_m[k], end_m)
-        if work.lost_lane[k] == lane and low <= high:
-            count = insert(near, far, 0, count, low, high)
-    space.held[row] = intersect(
-        near,
-        far,
-        0,
-        count,
-        work.hidden_near_m,
-        work.hidden_far_m,
-        0,
-        hidden,
-        space.near_m,
-        space.far_m,
-        row,
-    )
-    return space.near_m[row, 0] if space.held[row] > 0 else math.inf
+            grown_near_m[0, count] = max(near_m[row, k] - ahead, exit_m)
+            grown_far_m[0, count] = high
+            count += 1
+    grown_near_m[0, count], grown_far_m[0, count] = max(end_m - ahead, exit_m), end_m
+    return count + 1
 
 
 @kernel
 def keep_seen(
-    space: HiddenSpace,
+    seen: Integers,
+    seen_id: Integers,
+    seen_lane: Integers,
+    seen_distance_m: Floats,
     b: int,
-    time_s: float,
     mask: Booleans,
     ids: Integers,
     lane: Integers,
     distance_m: Floats,
 ) -> None:
-    """Remember the time of a look and the pairs (B, N) seen at it."""
-    space.time_s[b] = time_s
+    """Remember the pairs (B, N) that are seen; seen, ...: of HiddenSpace."""
     count = 0
     for k in range(mask.shape[1]):
         if mask[b, k]:
-            space.seen_id[b, count] = ids[b, k]
-            space.seen_lane[b, count] = lane[b, k]
-            space.seen_distance_m[b, count] = distance_m[b, k]
+            seen_id[b, count] = ids[b, k]
+            seen_lane[b, count] = lane[b, k]
+            seen_distance_m[b, count] = distance_m[b, k]
             count += 1
-    space.seen[b] = count
+    seen[b] = count

@@ -20,7 +20,26 @@ _TOUCH_M = 1e-9
 
 @kernel
 def insert(near: Floats, far: Floats, row: int, count: int, low: float, high: float) -> int:
-    """Unite a set of `count` intervals with [low, high]; return the new count."""
+    """Unite a set of `count` intervals with [low, high]; return the new count.
+
+    The set's intervals may overlap, as long as both their ends ascend.
+    """
+    # Most come in ascending order, and find room.
+    last = count - 1
+    if count == 0 or (low > far[row, last] + _TOUCH_M and count < near.shape[1] - 1):
+        near[row, count], far[row, count] = low, high
+        return count + 1
+    if near[row, last] <= low <= far[row, last] + _TOUCH_M:
+        far[row, last] = max(far[row, last], high)
+        return count
+    return _insert_between(near, far, row, count, low, high)
+
+
+@kernel
+def _insert_between(
+    near: Floats, far: Floats, row: int, count: int, low: float, high: float
+) -> int:
+    """Do as `insert`, anywhere."""
     begin = count
     while begin > 0 and far[row, begin - 1] >= low - _TOUCH_M:
         begin -= 1
@@ -75,13 +94,24 @@ def intersect(
     far: Floats,
     row: int,
 ) -> int:
-    """Write what sets a and b share into row `row` of a third table; return how many intervals."""
+    """Write what sets a and b share into row `row` of a third table; return how many intervals.
+
+    The intervals of a and b may overlap, as long as both their ends ascend.
+    """
     count, a, b = 0, 0, 0
+    room = near.shape[1] - 1
     while a < count_a and b < count_b:
         low = max(near_a[row_a, a], near_b[row_b, b])
         high = min(far_a[row_a, a], far_b[row_b, b])
         if low <= high:
-            count = insert(near, far, row, count, low, high)
+            # As `insert` does, without the call: these come in ascending order.
+            if count > 0 and low <= far[row, count - 1] + _TOUCH_M:
+                far[row, count - 1] = max(far[row, count - 1], high)
+            elif count < room:
+                near[row, count], far[row, count] = low, high
+                count += 1
+            else:
+                count = insert(near, far, row, count, low, high)
         if far_a[row_a, a] < far_b[row_b, b]:
             a += 1
         else:

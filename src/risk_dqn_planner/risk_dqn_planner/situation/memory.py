@@ -8,7 +8,7 @@ import numpy as np
 
 from risk_dqn_planner.compiled import kernel
 from risk_dqn_planner.situation.config import SituationConfig
-from risk_dqn_planner.situation.hidden_pieces import bounds_kernel, hidden_pieces_kernel
+from risk_dqn_planner.situation.hidden_pieces import hidden_pieces_kernel, looked_at
 from risk_dqn_planner.situation.hidden_space import (
     HiddenSpace,
     HiddenWork,
@@ -27,6 +27,8 @@ from risk_dqn_planner.situation.situations import Floats, Situations
 @kernel
 def look_kernel(
     table: PathTable,
+    exit_m: Floats,
+    end_m: Floats,
     polygon: Floats,
     sensor_range: float,
     time_s: float,
@@ -41,42 +43,76 @@ def look_kernel(
 ) -> Floats:
     """Bring all sets to the present; return each lane's nearest place of a hidden vehicle (M,).
 
-    limit_mps (M,): of hidden vehicles. area_age_s: between what the polygon shows and `time_s`;
-    meanwhile they may have come into it. `sensor_range` where there is no place.
+    exit_m, end_m (P,): see `looked_at`. limit_mps (M,): of hidden vehicles. area_age_s: between
+    what the polygon shows and `time_s`; meanwhile they may have come into it. `sensor_range` where
+    there is no place.
     """
     mask, ids = situations.vehicle_mask, situations.vehicle_id
     elapsed = elapsed_since(space.time_s[0], time_s)
-    lost = find_lost(space, 0, mask, ids, elapsed, limit_mps, slowest_mps, vehicle_margin_m, work)
-    nearest = np.full(len(limit_mps), sensor_range)
+    space.time_s[0] = time_s
+    lost = find_lost(
+        space.seen,
+        space.seen_id,
+        space.seen_lane,
+        space.seen_distance_m,
+        0,
+        mask,
+        ids,
+        elapsed,
+        limit_mps,
+        slowest_mps,
+        vehicle_margin_m,
+        work.lost_lane,
+        work.lost_near_m,
+        work.lost_far_m,
+    )
     for p in range(len(table.lane)):
-        lane = table.lane[p]
-        exit_m, end_m = bounds_kernel(table, p, sensor_range)
-        hidden = hidden_pieces_kernel(
+        work.hidden[p] = hidden_pieces_kernel(
             table,
             p,
             polygon,
-            exit_m,
-            end_m,
-            visible_margin_m + limit_mps[lane] * area_age_s,
+            exit_m[p],
+            end_m[p],
+            visible_margin_m + limit_mps[table.lane[p]] * area_age_s,
             work.hidden_near_m,
             work.hidden_far_m,
         )
-        place = carry_on(
-            space,
-            p,
-            lane,
-            exit_m,
-            end_m,
-            elapsed,
-            limit_mps[lane],
-            slowest_mps,
-            lost,
-            hidden,
-            work,
-        )
-        nearest[lane] = min(nearest[lane], place)
-    keep_seen(space, 0, time_s, mask, ids, situations.vehicle_lane, situations.vehicle_distance_m)
-    return nearest
+    nearest = np.full((1, len(limit_mps)), sensor_range)
+    carry_on(
+        space.near_m,
+        space.far_m,
+        space.held,
+        0,
+        table.lane,
+        exit_m,
+        end_m,
+        elapsed,
+        limit_mps,
+        slowest_mps,
+        work.lost_lane,
+        work.lost_near_m,
+        work.lost_far_m,
+        lost,
+        work.hidden_near_m,
+        work.hidden_far_m,
+        work.hidden,
+        work.grown_near_m,
+        work.grown_far_m,
+        nearest,
+    )
+    keep_seen(
+        space.seen,
+        space.seen_id,
+        space.seen_lane,
+        space.seen_distance_m,
+        0,
+        mask,
+        ids,
+        situations.vehicle_lane,
+        situations.vehicle_distance_m,
+    )
+    result: Floats = nearest[0]
+    return result
 
 
 class Look(NamedTuple):
@@ -101,7 +137,8 @@ class LaneMemory:
         self._config = config
         self._limit_mps = limit_mps * config.tracking.speed_factor
         self._space = empty_hidden_space(1, len(table.lane), 1)
-        self._work = hidden_work(1)
+        self._work = hidden_work(len(table.lane), 1)
+        self._bounds = looked_at(table, config.sensor_range_m)
         self._ego: EgoPose | None = None
 
     def forget(self) -> None:
@@ -119,8 +156,9 @@ class LaneMemory:
             self.forget()
         self._make_room(look.seen.vehicle_mask.shape[1])
         tracking = self._config.tracking
-        nearest = look_kernel(
+        nearest: Floats = look_kernel(
             self._table,
+            *self._bounds,
             np.ascontiguousarray(look.visible_area, dtype=np.float64),
             self._config.sensor_range_m,
             look.time_s,
@@ -163,4 +201,4 @@ class LaneMemory:
             seen_lane=np.pad(space.seen_lane, more),
             seen_distance_m=np.pad(space.seen_distance_m, more),
         )
-        self._work = hidden_work(vehicles)
+        self._work = hidden_work(len(self._table.lane), vehicles)

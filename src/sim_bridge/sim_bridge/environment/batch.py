@@ -119,6 +119,7 @@ class BatchEnvironment:
         """Return everything that `load_state_dict` needs to go on identically."""
         return {
             "simulation": copy.deepcopy(self._simulation.state),
+            "memory": copy.deepcopy(self._simulation.memory),
             "encoder": copy.deepcopy(self._encoder),
             "begun": self._begun.copy(),
             "ended": self._ended.copy(),
@@ -127,6 +128,8 @@ class BatchEnvironment:
     def load_state_dict(self, state: dict[str, Any]) -> None:
         """Take over an interrupted run of the same scenario, map and batch."""
         self._simulation.state = copy.deepcopy(state["simulation"])
+        # Runs from before there was a memory have none.
+        self._simulation.memory = copy.deepcopy(state.get("memory"))
         self._encoder = copy.deepcopy(state["encoder"])
         self._begun[:] = state["begun"]
         self._ended = state["ended"].copy()

@@ -13,6 +13,7 @@ from risk_dqn_planner.intersection.builder import build_intersection
 from risk_dqn_planner.intersection.config import IntersectionConfig
 from risk_dqn_planner.intersection.model import IntersectionModel
 from risk_dqn_planner.map.loader import MapOrigin, RoadMap, load_map
+from risk_dqn_planner.situation.config import INSTANTANEOUS, TrackingConfig
 from sim_bridge.maps import shipped_map
 from sim_bridge.scenarios.loading import Scenario
 from sim_bridge.simulation.simulation import Simulation
@@ -26,9 +27,22 @@ class Place:
     model: IntersectionModel
     outlines: tuple[NDArray[np.float64], ...]
 
-    def simulation(self, scenario: Scenario, batch: int) -> Simulation:
-        """Lay out a scenario here for a batch of episodes."""
-        return Simulation(self.model, scenario, batch, keep_out=self.outlines)
+    def simulation(
+        self,
+        scenario: Scenario,
+        batch: int,
+        memory: str = INSTANTANEOUS,
+        tracking: TrackingConfig | None = None,
+    ) -> Simulation:
+        """Lay out a scenario here for a batch of episodes; memory and tracking as in Simulation."""
+        return Simulation(
+            self.model,
+            scenario,
+            batch,
+            keep_out=self.outlines,
+            memory=memory,
+            tracking=tracking,
+        )
 
 
 def load_place(

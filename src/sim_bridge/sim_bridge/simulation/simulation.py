@@ -11,6 +11,13 @@ from numpy.typing import ArrayLike, NDArray
 from risk_dqn_planner.decision import Action
 from risk_dqn_planner.errors import ConfigurationError
 from risk_dqn_planner.intersection.model import IntersectionModel
+from risk_dqn_planner.situation.config import (
+    INSTANTANEOUS,
+    TRACKED,
+    TrackingConfig,
+    require_memory,
+)
+from risk_dqn_planner.situation.hidden_space import HiddenSpace
 from risk_dqn_planner.situation.situations import (
     Booleans,
     Floats,
@@ -20,6 +27,7 @@ from risk_dqn_planner.situation.situations import (
 )
 from risk_dqn_planner.vehicle import EgoLimits
 from sim_bridge.perception.perception import VehiclePoses, empty_view, perceive, reveal
+from sim_bridge.perception.tracking import Tracker
 from sim_bridge.perception.visible_area import visible_polygon
 from sim_bridge.scenarios.fields import Scenario
 from sim_bridge.simulation.settings import settings_of
@@ -67,8 +75,9 @@ class EpisodeStatistics(NamedTuple):
 class Simulation:
     """B episodes of one scenario at one intersection.
 
-    Public for reading: `model`, `scenario`, `batch`, `world`, `settings` and `state` (see
-    SimulationState). The same seed gives the same episode in any batch.
+    Public for reading: `model`, `scenario`, `batch`, `world`, `settings`, `state` (see
+    SimulationState) and `tracker`, the planner's memory, None without one. The same seed gives
+    the same episode in any batch. What goes on is in `state` and `memory`.
     """
 
     def __init__(
@@ -79,15 +88,20 @@ class Simulation:
         world_seed: int = 0,
         keep_out: Sequence[NDArray[np.float64]] = (),
         ego_limits: EgoLimits | None = None,
+        memory: str = INSTANTANEOUS,
+        tracking: TrackingConfig | None = None,
     ) -> None:
         """Lay out the scenario; `world_seed` and `keep_out` as in `build_world`.
 
+        memory, tracking: how the planner tells where hidden vehicles may be, see SituationConfig.
+
         Raises:
-            ConfigurationError: the batch is empty.
+            ConfigurationError: the batch is empty, or there is no such memory.
             ScenarioError, NoConflictError: the scenario does not fit the model.
         """
         if batch < 1:
             raise ConfigurationError(f"batch is {batch}, expected at least 1")
+        require_memory(memory)
         self.model = model
         self.scenario = scenario
         self.batch = batch
@@ -97,6 +111,23 @@ class Simulation:
         obstacles = 2 * scenario.obstacles.per_side
         self.state = empty_state(batch, vehicles, obstacles, len(model.lanes))
         self._view = empty_view(batch, vehicles, obstacles)
+        self._pairs = max(vehicles * most_lanes_at_once(self.world.matches), 1)
+        self.tracker: Tracker | None = None
+        if memory == TRACKED:
+            config = tracking or TrackingConfig()
+            self.tracker = Tracker(self.world, config, scenario.sensor.range_m, batch, self._pairs)
+
+    @property
+    def memory(self) -> HiddenSpace | None:
+        """All that is remembered of what was seen; None without memory."""
+        return None if self.tracker is None else self.tracker.space
+
+    @memory.setter
+    def memory(self, memory: HiddenSpace | None) -> None:
+        if self.tracker is not None and memory is not None:
+            self.tracker.space = memory
+        elif self.tracker is not None:
+            self.tracker.forget(np.ones(self.batch, dtype=np.bool_))
 
     def reset(self, seeds: ArrayLike, mask: ArrayLike | None = None) -> None:
         """Start the episodes of seeds (B,), or only those that `mask` (B,) names.
@@ -123,6 +154,8 @@ class Simulation:
             np.ascontiguousarray(given.astype(np.uint64)),
             np.ascontiguousarray(chosen.astype(np.bool_)),
         )
+        if self.tracker is not None:
+            self.tracker.forget(chosen.astype(np.bool_))
 
     def step(self, actions: ArrayLike) -> StepResult:
         """Carry out actions (B,) for one decision period.
@@ -191,11 +224,12 @@ class Simulation:
             self._view,
             result,
         )
+        if self.tracker is not None:
+            self.tracker.look(episodes.tick, self.settings.step_s, self._view, result)
         return result
 
     def _empty_situations(self) -> Situations:
-        places = self.state.vehicles.driving.shape[1] * most_lanes_at_once(self.world.matches)
-        result = empty_situations(self.batch, max(places, 1), len(self.model.lanes))
+        result = empty_situations(self.batch, self._pairs, len(self.model.lanes))
         lanes = self.world.lanes
         result.lane_mask[:] = True
         result.lane_id[:] = lanes.id

@@ -8,6 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from bench.progress import say
+
 
 class Latency(NamedTuple):
     """How long a call takes: median and 99th percentile [ms]."""
@@ -34,14 +36,16 @@ class Stopwatch:
 
 
 def in_turns(contestants: Mapping[str, Callable[[], float]], rounds: int) -> dict[str, float]:
-    """Let each contestant measure itself once a round; return its median over the rounds.
+    """Let each contestant measure its speed once a round; return its median over the rounds.
 
     Taking turns, all of them meet the same moods of the machine.
     """
     results: dict[str, list[float]] = {name: [] for name in contestants}
-    for _ in range(rounds):
+    for number in range(1, rounds + 1):
         for name, measure in contestants.items():
             results[name].append(measure())
+        speeds = ", ".join(f"{name} {values[-1]:,.0f}/s" for name, values in results.items())
+        say(f"round {number} of {rounds}: {speeds}")
     return {name: median(values) for name, values in results.items()}
 
 

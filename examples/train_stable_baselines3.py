@@ -22,7 +22,6 @@ from collections.abc import Sequence
 
 import gymnasium
 from stable_baselines3 import DQN
-from stable_baselines3.common.callbacks import ProgressBarCallback
 
 import sim_bridge.environment  # noqa: F401 (makes the environment known to Gymnasium)
 
@@ -51,8 +50,9 @@ def train(options: argparse.Namespace) -> DQN:
         policy_kwargs={"net_arch": [120, 120]},
         device="cpu",
         seed=options.seed,
+        verbose=1,
     )
-    return model.learn(options.steps, callback=ProgressBarCallback())
+    return model.learn(options.steps, log_interval=200)
 
 
 def evaluate(model: DQN, options: argparse.Namespace) -> Counter[str]:

@@ -20,7 +20,7 @@ _PAGE = """\
 ## Curiosities of the paper
 
 - The rule-based policy's speed falls from {near:g} to {far:g} m/s as the sensor range *grows* from
-  {near_m:g} to {far_m:g} m, although more sight can only make Algorithm 1 bolder.{own_fall}
+  {near_m:g} to {far_m:g} m, although more sight should make Algorithm 1 bolder.{own_fall}
 - It is {blind:.1f} m/s at {blind_m:g} m, although the ego must at least have driven to the stop
   line.{own_blind}
 - Success rates come in steps of {step:g}, so each rests on 10 or 20 episodes. Wilson's 95% interval

@@ -115,7 +115,9 @@ def _actions(lines: Sequence[Line], path: Path) -> Path | None:
         bars = Bars(place, _ACTIONS, drawn)
         for policy in drawn:
             bars.add(policy, actions_normalised(cell_of(lines, policy, traffic=traffic), reference))
-            bars.paper(policy, ACTION_USAGE.get(paper_role(policy) or "", {}))
+            # The rule is 1 by definition, in the paper as here.
+            if policy != RULE_BASED:
+                bars.paper(policy, ACTION_USAGE.get(paper_role(policy) or "", {}))
         _describe(place, traffic, "relative number")
     legend(figure, _labels(lines, drawn), paper=True, **{_INTERVAL: interval_mark()})
     return save(figure, path)

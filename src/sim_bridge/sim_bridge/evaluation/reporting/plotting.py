@@ -106,11 +106,13 @@ class Bars:
             )  # fmt: skip
 
     def paper(self, policy: str, values: Mapping[str, float]) -> None:
-        """Mark the values that the paper states for a policy."""
+        """Mark the values that the paper states for a policy, beside our number and interval."""
+        aside = 0.36 * self._width
         for group, value in values.items():
             self._axes.plot(
-                self._center(policy, group), value, marker="D", markersize=7, color="white",
-                markeredgecolor="black", markeredgewidth=1.4, zorder=5, clip_on=False,
+                self._center(policy, group) + aside, value, marker="D", markersize=6.5,
+                color=self._colors[policy], markeredgecolor="black", markeredgewidth=1.4, zorder=5,
+                clip_on=False,
             )  # fmt: skip
 
     def limit(self, values: Values) -> None:
@@ -133,7 +135,7 @@ def legend(figure: Figure, policies: Mapping[str, str], *, paper: bool, **more: 
             [], [], linestyle="", marker="D", color="white", markeredgecolor="black",
             markeredgewidth=1.4, markersize=7,
         )  # fmt: skip
-        entries.append((mark, "the paper's value"))
+        entries.append((mark, "the paper's value, in the policy's colour"))
     entries += [(artist, label) for label, artist in more.items()]
     handles, labels = zip(*entries, strict=True)
     figure.legend(handles, labels, loc="outside lower center", ncols=3, fontsize=9.5, frameon=False)

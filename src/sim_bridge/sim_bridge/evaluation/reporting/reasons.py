@@ -103,7 +103,7 @@ def _short_sight(lines: Sequence[Line]) -> str:
     return (
         f"**At {RANGES_M[0]:g} m the rule never crosses, but it does drive**: "
         f"{as_speed(speed.value)}, since it comes up to the line before it waits for the rest of "
-        "the time. The paper's 0.0 m/s must have been measured otherwise."
+        "the time. How the paper's 0.0 m/s was measured is not said."
     )
 
 
@@ -116,8 +116,8 @@ def _bolder_with_sight(lines: Sequence[Line]) -> str:
     return (
         "**More sight does not slow the rule down**: "
         f"{as_speed(near.value)} at {RANGES_M[1]:g} m, {as_speed(far.value)} at {RANGES_M[2]:g} m. "
-        "A hidden vehicle further away is a milder worst case, so the paper's fall cannot come "
-        "from Algorithm 1; more likely its episodes at 90 m were others."
+        "A hidden vehicle further away is a milder worst case, so Algorithm 1 alone does not "
+        "explain the paper's fall; perhaps its episodes at 90 m were others."
     )
 
 
@@ -131,13 +131,14 @@ def _possible(lines: Sequence[Line]) -> str:
     ]
     if not shares:
         return ""
-    impossible = as_percent(1.0 - min(shares))
-    how = "nothing here is impossible" if min(shares) == 1.0 else f"at most {impossible} is lost"
-    return (
-        f"**What could be done**: the clairvoyant, who knows all traffic, reaches the goal in "
-        f"{as_percent(min(shares))} or more of the episodes of every situation: {how}. Timeouts "
-        "are therefore always the price of not knowing, or of caution."
+    least = min(shares)
+    found = (
+        "in every episode of every situation. Nothing here is impossible: a timeout is the price "
+        "of not knowing, or of caution"
+        if least == 1.0
+        else f"in {as_percent(least)} or more of the episodes of each situation"
     )
+    return f"**What could be done**: the clairvoyant, who knows all traffic, gets through {found}."
 
 
 def _seeds(lines: Sequence[Line]) -> str:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """An adversary that keeps the assumptions finds no collision, and finds them once it may not.
 
-The worlds and the search are in adversary.py.
+The worlds and the search are in adversary.py and merging_adversary.py.
 """
 
 import importlib.util
@@ -32,6 +32,7 @@ def beside(name: str) -> ModuleType:
 
 
 adversary = beside("adversary")
+merging_adversary = beside("merging_adversary")
 
 
 def supervisor(
@@ -93,3 +94,20 @@ def test_braking_believed_too_strong_lets_the_adversary_win() -> None:
 def test_without_a_supervisor_the_adversary_wins_everywhere() -> None:
     found, _ = adversary.search(supervisor(mode=SupervisorMode.OFF), seed=6, generations=0)
     assert found >= 10
+
+
+@pytest.mark.parametrize("brave", [True, False], ids=["fastest sound action", "any proposals"])
+def test_no_traffic_within_the_assumptions_hits_an_ego_that_merges(brave: bool) -> None:
+    nearest_m = merging_adversary.search(supervisor(), seed=1, rows=320, generations=4, brave=brave)
+    assert 0.0 < nearest_m < 1.0
+
+
+@pytest.mark.parametrize(
+    "weak",
+    [SafetyAssumptions(follower_reaction_s=0.0), SafetyAssumptions(leader_braking_mps2=3.5)],
+    ids=["followers react at once", "leaders brake gently"],
+)
+def test_what_others_do_not_keep_lets_the_adversary_hit_an_ego_that_merges(
+    weak: SafetyAssumptions,
+) -> None:
+    assert merging_adversary.search(supervisor(weak), seed=3, generations=15) < 0.0

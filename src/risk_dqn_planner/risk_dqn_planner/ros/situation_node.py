@@ -49,7 +49,6 @@ class SituationNode(Node):
         self._sync_config = self._declare_synchroniser()
         self._synchroniser = Synchroniser(self._sync_config)
         self._pipeline = self._declare_pipeline()
-        example_situation()  # compiles, so that the first message need not wait
         self._output = SituationOutput(self, self._map.map_frame)
         self._marker_publisher = self.create_publisher(MarkerArray, "~/debug/markers", NEWEST)
         self._start_timers()
@@ -68,6 +67,7 @@ class SituationNode(Node):
         given = {"sensor_range_m": situation.sensor_range_m}
         intersection = declare(self, IntersectionConfig, prefix="intersection.", given=given)
         road_map = self._map.load()
+        example_situation(situation)  # compiles, so that the first message need not wait
         return SituationPipeline(
             lambda route: build_intersection(road_map, route, intersection), situation
         )

@@ -18,6 +18,7 @@ from risk_dqn_planner.intersection.model import (
     StopLine,
 )
 from risk_dqn_planner.situation.builder import SituationBuilder
+from risk_dqn_planner.situation.config import SituationConfig
 from risk_dqn_planner.situation.inputs import EgoPose, object_arrays
 from risk_dqn_planner.situation.situations import Floats, Situations
 from risk_dqn_planner.vehicle import VehicleDimensions
@@ -61,9 +62,9 @@ def square(half_size_m: float) -> Floats:
     return np.array([[-h, -h], [h, -h], [h, h], [-h, h]])
 
 
-def example_situation() -> Situations:
+def example_situation(config: SituationConfig | None = None) -> Situations:
     """Return what the ego sees 20 m before the crossing: one vehicle, the lane free for 40 m."""
-    builder = SituationBuilder(crossing_model())
+    builder = SituationBuilder(crossing_model(), config)
     ego = EgoPose(-20.0, 0.0, 0.0, EGO_SPEED_MPS)
     vehicle = object_arrays([[0.0, -30.0, math.pi / 2, EGO_SPEED_MPS]])
     return builder.build(ego, vehicle, square(40.0))

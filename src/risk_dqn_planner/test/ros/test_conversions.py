@@ -120,6 +120,15 @@ def test_a_message_in_another_frame_is_refused() -> None:
         conversions.perception_from_messages(odometry, area, objects, "map", 0.0)
 
 
+def test_an_older_visible_area_is_known_to_be_older() -> None:
+    odometry = conversions.ego_to_message(EgoPose(1.0, 2.0, 0.3, 4.0), STAMP_NS)
+    objects = conversions.objects_to_message(object_arrays(), STAMP_NS)
+    for older_ns in (0, 300_000_000, -100_000_000):
+        area = conversions.area_to_message(square(5.0), STAMP_NS - older_ns)
+        seen = conversions.perception_from_messages(odometry, area, objects, "map", 0.0)
+        assert seen.visible_area_age_s == pytest.approx(1e-9 * older_ns)
+
+
 def test_a_route_survives() -> None:
     message = conversions.route_to_message((3476, 16497, -5), STAMP_NS)
     assert conversions.route_from_message(message) == (3476, 16497, -5)

@@ -12,6 +12,7 @@ from risk_dqn_planner.errors import (
     PlannerError,
 )
 from risk_dqn_planner.intersection.model import IntersectionModel
+from risk_dqn_planner.situation.config import SituationConfig
 from risk_dqn_planner.situation.inputs import EgoPose, Perception, object_arrays
 from risk_dqn_planner.situation.pipeline import SituationPipeline
 from risk_dqn_planner.situation.report import Status, fault_status
@@ -100,3 +101,45 @@ def test_each_kind_of_error_has_its_status(error: PlannerError, status: Status) 
 def test_an_error_that_no_input_can_cause_is_not_swallowed() -> None:
     with pytest.raises(MapError):
         fault_status(MapError("x"))
+
+
+SECOND_NS = 1_000_000_000
+HIDDEN_FROM_20_M = Perception(ON_ROUTE, object_arrays(), square(20.0))
+ALL_SEEN = Perception(ON_ROUTE, object_arrays(), square(80.0))
+
+
+def remembering() -> SituationPipeline:
+    pipeline = SituationPipeline(Maker(), SituationConfig(memory="tracked"))
+    pipeline.select((10,))
+    return pipeline
+
+
+def hidden_m(pipeline: SituationPipeline, time_s: float, seen: Perception) -> float:
+    # Stamps are of the epoch: the memory must not lose them to rounding.
+    report = pipeline.report(int((1.7e9 + time_s) * SECOND_NS), seen)
+    assert report.situations is not None
+    return float(report.situations.lane_hidden_distance_m[0, 0])
+
+
+def test_memory_knows_the_time_by_the_stamps() -> None:
+    pipeline = remembering()
+    assert hidden_m(pipeline, 0.0, ALL_SEEN) == pytest.approx(70.0)
+    # From beyond the end at 70 m with 7 m/s.
+    assert hidden_m(pipeline, 1.0, HIDDEN_FROM_20_M) == pytest.approx(63.0, abs=1e-4)
+    # A second in which the ego is off its route is a gap: vehicles drive on.
+    assert pipeline.report(0, perception(EgoPose(0.0, 30.0, 0.0, 4.0))).situations is None
+    assert hidden_m(pipeline, 3.0, HIDDEN_FROM_20_M) == pytest.approx(49.0, abs=1e-4)
+
+
+def test_memory_ends_with_the_route() -> None:
+    pipeline = remembering()
+    hidden_m(pipeline, 0.0, ALL_SEEN)
+    pipeline.select((2, 3))
+    pipeline.select((10,))
+    assert hidden_m(pipeline, 0.5, HIDDEN_FROM_20_M) == pytest.approx(20.0)
+
+
+def test_an_old_visible_area_tells_less() -> None:
+    pipeline = remembering()
+    old = HIDDEN_FROM_20_M._replace(visible_area_age_s=0.3)
+    assert hidden_m(pipeline, 0.0, old) == pytest.approx(17.9)

@@ -119,7 +119,7 @@ class BatchEnvironment:
         """Return everything that `load_state_dict` needs to go on identically."""
         return {
             "simulation": copy.deepcopy(self._simulation.state),
-            "memory": copy.deepcopy(self._simulation.memory),
+            "hidden_space": copy.deepcopy(self._simulation.hidden_space),
             "encoder": copy.deepcopy(self._encoder),
             "begun": self._begun.copy(),
             "ended": self._ended.copy(),
@@ -129,7 +129,7 @@ class BatchEnvironment:
         """Take over an interrupted run of the same scenario, map and batch."""
         self._simulation.state = copy.deepcopy(state["simulation"])
         # Runs from before there was a memory have none.
-        self._simulation.memory = copy.deepcopy(state.get("memory"))
+        self._simulation.hidden_space = copy.deepcopy(state.get("hidden_space"))
         self._encoder = copy.deepcopy(state["encoder"])
         self._begun[:] = state["begun"]
         self._ended = state["ended"].copy()

@@ -77,7 +77,7 @@ class Simulation:
 
     Public for reading: `model`, `scenario`, `batch`, `world`, `settings`, `state` (see
     SimulationState) and `tracker`, the planner's memory, None without one. The same seed gives
-    the same episode in any batch. What goes on is in `state` and `memory`.
+    the same episode in any batch. What goes on is in `state` and `hidden_space`.
     """
 
     def __init__(
@@ -118,14 +118,14 @@ class Simulation:
             self.tracker = Tracker(self.world, config, scenario.sensor.range_m, batch, self._pairs)
 
     @property
-    def memory(self) -> HiddenSpace | None:
-        """All that is remembered of what was seen; None without memory."""
+    def hidden_space(self) -> HiddenSpace | None:
+        """All that the memory holds, to be kept with `state`; None without memory."""
         return None if self.tracker is None else self.tracker.space
 
-    @memory.setter
-    def memory(self, memory: HiddenSpace | None) -> None:
-        if self.tracker is not None and memory is not None:
-            self.tracker.space = memory
+    @hidden_space.setter
+    def hidden_space(self, space: HiddenSpace | None) -> None:
+        if self.tracker is not None and space is not None:
+            self.tracker.space = space
         elif self.tracker is not None:
             self.tracker.forget(np.ones(self.batch, dtype=np.bool_))
 

@@ -258,6 +258,6 @@ def test_a_checkpoint_goes_on_with_the_same_memory() -> None:
 def test_without_memory_there_is_none(crossing_model: IntersectionModel, busy: Scenario) -> None:
     simulation = Simulation(crossing_model, busy, 2)
     assert simulation.tracker is None
-    assert simulation.memory is None
+    assert simulation.hidden_space is None
     with pytest.raises(ConfigurationError, match="memory is 'elephant'"):
         Simulation(crossing_model, busy, 2, memory="elephant")

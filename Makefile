@@ -32,7 +32,9 @@ RUN_OPTIONS = $(call option,--map,MAP) $(call option,--route,ROUTE) $(call optio
 SEEDS := 0 1 2
 RISK_AWARE_PAPER := --preset paper --reward risk --name risk_aware_paper
 COLLISION_AWARE_PAPER := --preset paper --reward collision --name collision_aware_paper
-TUNED := --preset tuned --reward risk --name tuned
+TUNED := --preset tuned --reward collision --steps 3000000 --name tuned \
+  --map four_way,t_junction,multi_lane,roundabout \
+  --scenario base,dense_traffic,severe_occlusion,close_small_obstacle
 
 .PHONY: help setup demo test replay bags maps train trainings evaluate ship bench shell format lint types check clean distclean
 

@@ -46,7 +46,10 @@ class SumoCrossing:
 
     def __init__(self, folder: Path) -> None:
         """Raises ImportError where libsumo is not installed."""
-        import libsumo  # noqa: PLC0415 (a peer, may be missing)
+        with warnings.catch_warnings():
+            # It misses SUMO's data, which are of no use here.
+            warnings.simplefilter("ignore")
+            import libsumo  # noqa: PLC0415 (a peer, may be missing)
 
         (folder / "crossing.net.xml").write_text(sumo_net.network(), encoding="utf-8")
         (folder / "crossing.rou.xml").write_text(sumo_net.routes(), encoding="utf-8")

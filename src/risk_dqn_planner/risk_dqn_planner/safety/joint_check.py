@@ -25,7 +25,7 @@ from risk_dqn_planner.safety.course import (
     with_manoeuvre,
 )
 from risk_dqn_planner.safety.merging import merging_margin
-from risk_dqn_planner.safety.others import NOTHING, earliest_arrival
+from risk_dqn_planner.safety.others import NOTHING, earliest_arrivals
 from risk_dqn_planner.situation.situations import Booleans, Floats, Integers, Situations
 
 ACTIONS = 3
@@ -41,8 +41,8 @@ class JointCheck(NamedTuple):
 
     admissible; periods: the manoeuvre that vindicates the action, as the number of decision
     periods of going before the ego brakes to rest: 0 is BRAKE, GO for ever; -1 none.
-    margin_s: time left of the vindicating manoeuvre, or (negative) missing in the best one; room
-    counts as the time that the ego takes for it at fast speed; infinity where nobody matters.
+    margin_s: time left of the vindicating manoeuvre, or (negative) missing in GO; room counts as
+    the time that the ego takes for it at fast speed; infinity where nobody matters.
     critical_vehicle: index of who has that margin, -1 a hidden vehicle or nobody; critical_lane:
     index of its lane, -1 nobody.
     """
@@ -55,11 +55,16 @@ class JointCheck(NamedTuple):
 
 
 class Verdict(NamedTuple):
-    """The margin of one course, and whose it is."""
+    """The margin of one course, and whose it is.
+
+    bound_m: no other manoeuvre after the same action, but one that rests within this, is safe;
+    known of GO alone, which leaves every zone first.
+    """
 
     margin_s: float
     vehicle: int
     lane: int
+    bound_m: float
 
 
 def joint_check(
@@ -145,10 +150,8 @@ def foresee(
             continue
         end_m = s.lane_ego_distance_m[row, lane] + 0.5 * s.lane_ego_zone_m[row, lane]
         last_m = max(last_m, end_m + p.zone_margin_m)
-        if s.lane_merging[row, lane]:
-            merging = True
-        else:
-            arrival_s[lane], who[lane] = earliest_arrival(s, row, lane, p)
+        merging |= s.lane_merging[row, lane]
+    earliest_arrivals(s, row, p, arrival_s, who)
     return last_m, merging
 
 
@@ -166,7 +169,7 @@ def vindicate(
 ) -> tuple[int, Verdict]:
     """Return the manoeuvre that makes a course safe, -1 for none, and the verdict on it.
 
-    Without one, the verdict is that of the best of braking and going.
+    Without one, the verdict is that of going.
     """
     braking = with_manoeuvre(course, BRAKE, p)
     verdict = judge(s, row, braking, arrival_s, who, reacted_m, p)
@@ -175,18 +178,18 @@ def vindicate(
     going = judge(s, row, course, arrival_s, who, reacted_m, p)
     if going.margin_s >= -_ROUNDING:
         return GO, going
-    best = going if going.margin_s > verdict.margin_s else verdict
+    # Behind all zones a rest is of use only where going on for ever fails, behind a leader.
+    bound_m = going.bound_m if merging else min(going.bound_m, last_m)
     for periods in range(1, _MOST_PERIODS + 1):
         stopping = with_manoeuvre(course, periods, p)
-        # Behind all zones it is of use only where going on for ever fails, behind a leader.
-        if stopping.rest_m > last_m and not merging:
+        if stopping.rest_m > bound_m + _ROUNDING:
             break
         verdict = judge(s, row, stopping, arrival_s, who, reacted_m, p)
         if verdict.margin_s >= -_ROUNDING:
             return periods, verdict
         if stopping.rest_m > last_m:
             break
-    return NO_MANOEUVRE, best
+    return NO_MANOEUVRE, going
 
 
 @kernel
@@ -200,27 +203,51 @@ def judge(
     p: SafetyNumbers,
 ) -> Verdict:
     """Return the least margin of a course over all lanes."""
-    least = Verdict(math.inf, NOTHING, NOTHING)
+    least_s, whose, where, bound_m = math.inf, NOTHING, NOTHING, math.inf
     for lane in range(s.lane_mask.shape[1]):
         if not s.lane_mask[row, lane]:
             continue
-        half_m = 0.5 * s.lane_ego_zone_m[row, lane]
-        start_m = s.lane_ego_distance_m[row, lane] - half_m
-        end_m = s.lane_ego_distance_m[row, lane] + half_m
-        if c.rest_m <= start_m - p.zone_margin_m + _ROUNDING:
-            continue
         if s.lane_merging[row, lane]:
-            # At rest before the zone, but not far enough, is no place to be.
-            margin_s, vehicle = -math.inf, NOTHING
-            if c.rest_m > start_m:
-                room_m, vehicle = merging_margin(s, row, lane, reacted_m, c, p, start_m)
-                margin_s = room_m / p.fast_mps
-        elif end_m <= 0.0 or arrival_s[lane] == math.inf:
-            continue
+            margin_s, vehicle, within_m = merging_verdict(s, row, lane, c, reacted_m, p)
         else:
-            margin_s, vehicle = -math.inf, who[lane]
-            if c.rest_m >= end_m + p.zone_margin_m:
-                margin_s = arrival_s[lane] - time_at(c, end_m, p) - p.safe_gap_s
-        if margin_s < least.margin_s:
-            least = Verdict(margin_s, vehicle, lane)
-    return least
+            vehicle = who[lane]
+            margin_s, within_m = crossing_verdict(s, row, lane, c, arrival_s[lane], p)
+        if margin_s < -_ROUNDING:
+            bound_m = min(bound_m, within_m)
+        if margin_s < least_s:
+            least_s, whose, where = margin_s, vehicle, lane
+        if least_s < -_ROUNDING and c.rest_m < math.inf:
+            # Nobody asks by how much a course that comes to rest fails.
+            break
+    return Verdict(least_s, whose, where, bound_m)
+
+
+@kernel
+def crossing_verdict(
+    s: Situations, row: int, lane: int, c: Course, arrival_s: float, p: SafetyNumbers
+) -> tuple[float, float]:
+    """Return the time left at a crossing zone, and within what way a rest would be before it."""
+    half_m = 0.5 * s.lane_ego_zone_m[row, lane]
+    end_m = s.lane_ego_distance_m[row, lane] + half_m
+    before_m = s.lane_ego_distance_m[row, lane] - half_m - p.zone_margin_m
+    if c.rest_m <= before_m + _ROUNDING or end_m <= 0.0 or arrival_s == math.inf:
+        return math.inf, before_m
+    # At rest in the zone, or not far enough from it, is no place to be.
+    if c.rest_m < end_m + p.zone_margin_m:
+        return -math.inf, before_m
+    return arrival_s - time_at(c, end_m, p) - p.safe_gap_s, before_m
+
+
+@kernel
+def merging_verdict(
+    s: Situations, row: int, lane: int, c: Course, reacted_m: Floats, p: SafetyNumbers
+) -> tuple[float, int, float]:
+    """Return the room left at a merging lane as time, whose it is, and within what way to rest."""
+    start_m = s.lane_ego_distance_m[row, lane] - 0.5 * s.lane_ego_zone_m[row, lane]
+    before_m = start_m - p.zone_margin_m
+    if c.rest_m <= before_m + _ROUNDING:
+        return math.inf, NOTHING, before_m
+    if c.rest_m <= start_m:
+        return -math.inf, NOTHING, before_m
+    room_m, vehicle, within_m = merging_margin(s, row, lane, reacted_m, c, p, start_m)
+    return room_m / p.fast_mps, vehicle, within_m

@@ -77,13 +77,18 @@ def merging_margin(
     c: Course,
     p: SafetyNumbers,
     start_m: float,
-) -> tuple[float, int]:
-    """Return the least room of a merging lane [m] and whose it is, -1 for a hidden vehicle.
+) -> tuple[float, int, float]:
+    """Return the least room of a merging lane [m], whose it is, and where it could do.
 
-    For an ego that enters the zone after `start_m`. reacted_m (B, M): see `joint_check`.
+    For an ego that enters the zone after `start_m`. Whose: -1 for a hidden vehicle. Where: at
+    rest no further than this from now on nobody would forbid it; infinity if nobody does.
+    reacted_m (B, M): see `joint_check`.
     """
     enter_s = time_at(c, start_m, p)
     least_m, who = hidden_margin(s, row, lane, c, enter_s, p), -1
+    before_m = start_m - p.zone_margin_m
+    bound_m = math.inf if least_m >= 0.0 else before_m
+    needed_m = p.between_centres_m + p.clearance_m
     for vehicle in range(s.vehicle_mask.shape[1]):
         if not s.vehicle_mask[row, vehicle] or s.vehicle_lane[row, vehicle] != lane:
             continue
@@ -94,20 +99,30 @@ def merging_margin(
             now_m,
             s.lane_zone_m[row, lane],
         )
-        slow_mps = max(s.vehicle_speed_mps[row, vehicle] - p.speed_error_mps, 0.0)
+        slow_mps = max(float(s.vehicle_speed_mps[row, vehicle]) - p.speed_error_mps, 0.0)
         margin_m = leader_margin(c, ahead_m - p.position_error_m, slow_mps, p)
         mps = start_speed(s, row, vehicle, p)
+        top_mps = top_speed(s, row, lane, mps, p)
         reaction_s, gap_m = p.reaction_s, p.follower_gap_m
         if now_m + p.position_error_m <= reacted_m[row, lane]:
             reaction_s, gap_m = 0.0, p.clearance_m
-        top_mps = top_speed(s, row, lane, mps, p)
-        behind_m = follower_margin(
-            c, ahead_m + p.position_error_m, mps, top_mps, enter_s, reaction_s, gap_m, p
+        behind_m = ahead_m + p.position_error_m
+        # Who is too far behind to matter more than others needs no closer look.
+        far_m = -behind_m - p.between_centres_m - gap_m - top_mps * (enter_s + reaction_s)
+        if far_m - 0.5 * top_mps * top_mps / p.follower_down_mps2 >= max(least_m, 0.0):
+            continue
+        margin_m = max(
+            margin_m,
+            follower_margin(c, behind_m, mps, top_mps, enter_s, reaction_s, gap_m, p),
         )
-        margin_m = max(margin_m, behind_m)
+        if margin_m < 0.0:
+            ahead_m -= p.position_error_m
+            leads = ahead_m >= needed_m
+            rest_m = ahead_m + 0.5 * slow_mps * slow_mps / p.leader_down_mps2 - needed_m
+            bound_m = min(bound_m, max(rest_m, before_m) if leads else before_m)
         if margin_m < least_m:
             least_m, who = margin_m, vehicle
-    return least_m, who
+    return least_m, who, bound_m
 
 
 @kernel

@@ -12,7 +12,7 @@ from risk_dqn_planner.compiled import kernel
 from risk_dqn_planner.risk.motion import distance_after, speed_after
 from risk_dqn_planner.risk.rewards import reach_time
 from risk_dqn_planner.safety.assumptions import SafetyNumbers
-from risk_dqn_planner.situation.situations import Situations
+from risk_dqn_planner.situation.situations import Floats, Integers, Situations
 
 NOTHING = -1
 
@@ -59,22 +59,29 @@ def vehicle_arrival(s: Situations, row: int, vehicle: int, lane: int, p: SafetyN
 
 
 @kernel
-def earliest_arrival(s: Situations, row: int, lane: int, p: SafetyNumbers) -> tuple[float, int]:
-    """Return when anyone may reach a lane's zone, and the vehicle's index, -1 for a hidden one.
+def earliest_arrivals(
+    s: Situations, row: int, p: SafetyNumbers, arrival_s: Floats, who: Integers
+) -> None:
+    """Fill when anyone may reach each crossing lane's zone (M,), and the vehicle's index.
 
-    Of vehicles that may arrive at the same time the one with the lower id is named.
+    The index is -1 for a hidden vehicle. Of vehicles that may arrive at the same time the one
+    with the lower id is named.
     """
-    first_s, first = hidden_arrival(s, row, lane, p), NOTHING
+    for lane in range(s.lane_mask.shape[1]):
+        arrival_s[lane], who[lane] = math.inf, NOTHING
+        if s.lane_mask[row, lane] and not s.lane_merging[row, lane]:
+            arrival_s[lane] = hidden_arrival(s, row, lane, p)
     for vehicle in range(s.vehicle_mask.shape[1]):
-        if not s.vehicle_mask[row, vehicle] or s.vehicle_lane[row, vehicle] != lane:
+        lane = s.vehicle_lane[row, vehicle]
+        if not s.vehicle_mask[row, vehicle] or s.lane_merging[row, lane]:
             continue
-        arrival_s = vehicle_arrival(s, row, vehicle, lane, p)
-        if arrival_s < first_s or (
-            arrival_s == first_s < math.inf
+        own_s, first = vehicle_arrival(s, row, vehicle, lane, p), who[lane]
+        if own_s < arrival_s[lane] or (
+            own_s == arrival_s[lane]
+            and own_s < math.inf
             and (first == NOTHING or s.vehicle_id[row, vehicle] < s.vehicle_id[row, first])
         ):
-            first_s, first = arrival_s, vehicle
-    return first_s, first
+            arrival_s[lane], who[lane] = own_s, vehicle
 
 
 @kernel

@@ -112,8 +112,12 @@ class Simulation:
         self.state = empty_state(batch, vehicles, obstacles, len(model.lanes))
         self._view = empty_view(batch, vehicles, obstacles)
         self._pairs = max(vehicles * most_lanes_at_once(self.world.matches), 1)
+        self._instantaneous_lanes = self.world.lanes
         self.tracker: Tracker | None = None
         if memory == TRACKED:
+            # The memory says how far every lane is free, so nobody else need look along them.
+            nothing = np.zeros(1, dtype=np.int64)
+            self._instantaneous_lanes = self.world.lanes._replace(first_path=nothing)
             config = tracking or TrackingConfig()
             self.tracker = Tracker(self.world, config, scenario.sensor.range_m, batch, self._pairs)
 
@@ -214,7 +218,7 @@ class Simulation:
         perceive(
             world.ego,
             world.paths.table,
-            world.lanes,
+            self._instantaneous_lanes,
             world.matches,
             world.sight,
             world.obstacles.corners,

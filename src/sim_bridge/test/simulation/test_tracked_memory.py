@@ -12,7 +12,7 @@ from risk_dqn_planner.errors import ConfigurationError
 from risk_dqn_planner.intersection.model import IntersectionModel
 from risk_dqn_planner.risk.config import RiskConfig
 from risk_dqn_planner.situation.builder import SituationBuilder
-from risk_dqn_planner.situation.config import SituationConfig
+from risk_dqn_planner.situation.config import SituationConfig, TrackingConfig
 from risk_dqn_planner.situation.inputs import EgoPose, ObjectArrays
 from risk_dqn_planner.situation.situations import Booleans, Floats, Situations
 from risk_dqn_planner.state.history import StateEncoder
@@ -99,10 +99,26 @@ def test_every_hidden_vehicle_is_where_the_memory_says_one_may_be(map_name: str)
             hidden_steps += int(hidden.sum())
             blind = situations.lane_hidden_distance_m <= tracker_of(simulation).lines.exit_m.max()
             out_of_reach += int(blind.all(axis=1).sum())
-    # Together over a million; four maps.
-    assert steps > 300_000
-    assert hidden_steps > 60_000
+    # Four maps: together over two million.
+    assert steps > 500_000
+    assert hidden_steps > 150_000
     assert out_of_reach > 1000
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"speed_factor": 0.6}, {"min_speed_mps": 6.0}], ids=["too slow", "too fast"]
+)
+def test_wrong_assumptions_lose_vehicles(wrong: dict[str, float]) -> None:
+    """So the test above would notice."""
+    place = load_place("four_way")
+    scenario = load_scenario("severe_occlusion")
+    tracking = TrackingConfig(**wrong)
+    simulation = place.simulation(scenario, 256, memory="tracked", tracking=tracking)
+    lost = 0
+    for _ in drive(simulation, DECISIONS):
+        distance, _, hidden = hidden_vehicles(simulation)
+        lost += int((hidden & ~in_set(simulation, distance)).sum())
+    assert lost > 0
 
 
 @pytest.mark.parametrize("map_name", MAPS)

@@ -47,3 +47,12 @@ class Commitments:
         kept = np.where(action == self.next_action(), kept, BRAKE)
         self._periods = np.where(found != NO_MANOEUVRE, found, kept)
         self._action = action.copy()
+
+    def keep(self, rows: Integers) -> None:
+        """Go on with other rows (B,) of the batch in place of the present ones."""
+        self._periods, self._action = self._periods[rows], self._action[rows]
+
+    @property
+    def periods(self) -> Integers:
+        """How many periods of going are left of the manoeuvre verified last (B,), GO for ever."""
+        return self._periods

@@ -11,7 +11,7 @@ from collections import deque
 import numpy as np
 
 from risk_dqn_planner.safety.assumptions import SafetyAssumptions
-from risk_dqn_planner.situation.situations import Booleans, Floats, Situations
+from risk_dqn_planner.situation.situations import Booleans, Floats, Integers, Situations
 
 
 class Familiarity:
@@ -42,3 +42,7 @@ class Familiarity:
             return np.full(seen_m.shape, -np.inf)
         speed_mps = situations.lane_speed_limit_mps * self._limit_factor
         return np.asarray(self._seen_m[0] - speed_mps * self._elapsed_s)
+
+    def keep(self, rows: Integers) -> None:
+        """Go on with other rows (B,) of the batch in place of the present ones."""
+        self._seen_m = deque((seen_m[rows] for seen_m in self._seen_m), self._decisions + 1)

@@ -40,3 +40,16 @@ class Guard:
     def decided(self, check: JointCheck, action: Integers) -> None:
         """Take note of the actions (B,) that will be carried out."""
         self._commitments.carry_on(check, action)
+
+    def keep(self, rows: Integers) -> None:
+        """Go on with other rows (B,) of the batch in place of the present ones.
+
+        For searches, in which one situation is followed by several.
+        """
+        self._commitments.keep(rows)
+        self._familiarity.keep(rows)
+
+    @property
+    def periods(self) -> Integers:
+        """What is left of the manoeuvres verified last (B,), as in `JointCheck`."""
+        return self._commitments.periods

@@ -89,20 +89,20 @@ def merging_margin(
     before_m = start_m - p.zone_margin_m
     bound_m = math.inf if least_m >= 0.0 else before_m
     needed_m = p.between_centres_m + p.clearance_m
-    for vehicle in range(s.vehicle_mask.shape[1]):
-        if not s.vehicle_mask[row, vehicle] or s.vehicle_lane[row, vehicle] != lane:
+    # Taken out before the loop: reading fields inside costs a count of references each time.
+    mask, lanes = s.vehicle_mask, s.vehicle_lane
+    distance_m, speed_mps = s.vehicle_distance_m, s.vehicle_speed_mps
+    ego_m, ego_zone_m = s.lane_ego_distance_m[row, lane], s.lane_ego_zone_m[row, lane]
+    zone_m, limit_mps = s.lane_zone_m[row, lane], s.lane_speed_limit_mps[row, lane]
+    for vehicle in range(mask.shape[1]):
+        if not mask[row, vehicle] or lanes[row, vehicle] != lane:
             continue
-        now_m = s.vehicle_distance_m[row, vehicle]
-        ahead_m = leader_gap(
-            s.lane_ego_distance_m[row, lane],
-            s.lane_ego_zone_m[row, lane],
-            now_m,
-            s.lane_zone_m[row, lane],
-        )
-        slow_mps = max(float(s.vehicle_speed_mps[row, vehicle]) - p.speed_error_mps, 0.0)
+        now_m = distance_m[row, vehicle]
+        ahead_m = leader_gap(ego_m, ego_zone_m, now_m, zone_m)
+        slow_mps = max(float(speed_mps[row, vehicle]) - p.speed_error_mps, 0.0)
         margin_m = leader_margin(c, ahead_m - p.position_error_m, slow_mps, p)
-        mps = start_speed(s, row, vehicle, p)
-        top_mps = top_speed(s, row, lane, mps, p)
+        mps = start_speed(speed_mps[row, vehicle], p)
+        top_mps = top_speed(limit_mps, mps, p)
         reaction_s, gap_m = p.reaction_s, p.follower_gap_m
         if now_m + p.position_error_m <= reacted_m[row, lane]:
             reaction_s, gap_m = 0.0, p.clearance_m

@@ -18,15 +18,15 @@ NOTHING = -1
 
 
 @kernel
-def start_speed(s: Situations, row: int, vehicle: int, p: SafetyNumbers) -> float:
-    """Return the highest speed that a perceived vehicle may have now; nobody drives backwards."""
-    return max(float(s.vehicle_speed_mps[row, vehicle]) + p.speed_error_mps, 0.0)
+def start_speed(measured_mps: float, p: SafetyNumbers) -> float:
+    """Return the highest speed that a perceived vehicle may have; nobody drives backwards."""
+    return max(measured_mps + p.speed_error_mps, 0.0)
 
 
 @kernel
-def top_speed(s: Situations, row: int, lane: int, start_mps: float, p: SafetyNumbers) -> float:
+def top_speed(limit_mps: float, start_mps: float, p: SafetyNumbers) -> float:
     """Return the highest speed that a perceived vehicle may reach on its lane."""
-    return max(start_mps, float(s.lane_speed_limit_mps[row, lane]) * p.limit_factor)
+    return max(start_mps, limit_mps * p.limit_factor)
 
 
 @kernel
@@ -46,14 +46,16 @@ def hidden_arrival(s: Situations, row: int, lane: int, p: SafetyNumbers) -> floa
 
 
 @kernel
-def vehicle_arrival(s: Situations, row: int, vehicle: int, lane: int, p: SafetyNumbers) -> float:
+def vehicle_arrival(
+    now_m: float, zone_m: float, measured_mps: float, limit_mps: float, p: SafetyNumbers
+) -> float:
     """Return when a perceived vehicle may reach its zone at the earliest, infinity once it left."""
-    zone_m, now_m = s.lane_zone_m[row, lane], s.vehicle_distance_m[row, vehicle]
     if now_m + 0.5 * zone_m <= -p.position_error_m:
         return math.inf
-    mps = start_speed(s, row, vehicle, p)
+    mps = start_speed(measured_mps, p)
+    top_mps = top_speed(limit_mps, mps, p)
     arrival_s: float = reach_time(
-        now_m - p.position_error_m, zone_m, mps, p.others_up_mps2, top_speed(s, row, lane, mps, p)
+        now_m - p.position_error_m, zone_m, mps, p.others_up_mps2, top_mps
     )
     return arrival_s
 
@@ -71,15 +73,26 @@ def earliest_arrivals(
         arrival_s[lane], who[lane] = math.inf, NOTHING
         if s.lane_mask[row, lane] and not s.lane_merging[row, lane]:
             arrival_s[lane] = hidden_arrival(s, row, lane, p)
-    for vehicle in range(s.vehicle_mask.shape[1]):
-        lane = s.vehicle_lane[row, vehicle]
-        if not s.vehicle_mask[row, vehicle] or s.lane_merging[row, lane]:
+    # Taken out before the loop: reading fields inside costs a count of references each time.
+    mask, lanes, ids, merging = s.vehicle_mask, s.vehicle_lane, s.vehicle_id, s.lane_merging
+    distance_m, speed_mps = s.vehicle_distance_m, s.vehicle_speed_mps
+    zone_m, limit_mps = s.lane_zone_m, s.lane_speed_limit_mps
+    for vehicle in range(mask.shape[1]):
+        lane = lanes[row, vehicle]
+        if not mask[row, vehicle] or merging[row, lane]:
             continue
-        own_s, first = vehicle_arrival(s, row, vehicle, lane, p), who[lane]
+        own_s = vehicle_arrival(
+            distance_m[row, vehicle],
+            zone_m[row, lane],
+            speed_mps[row, vehicle],
+            limit_mps[row, lane],
+            p,
+        )
+        first = who[lane]
         if own_s < arrival_s[lane] or (
             own_s == arrival_s[lane]
             and own_s < math.inf
-            and (first == NOTHING or s.vehicle_id[row, vehicle] < s.vehicle_id[row, first])
+            and (first == NOTHING or ids[row, vehicle] < ids[row, first])
         ):
             arrival_s[lane], who[lane] = own_s, vehicle
 

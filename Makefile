@@ -61,11 +61,12 @@ bags: ## record the bags in bags/ again
 maps: ## draw the project's own maps again
 	@$(WITH_ROS) $(SIMULATION)/draw_maps $(ARGS)
 
-train: ## train a DQN, or go on with it [PRESET REWARD SEED STEPS MAP ROUTE ORIGIN SCENARIO NAME OUT]
+train: ## train a DQN, or go on with it [PRESET REWARD SEED STEPS MAP ROUTE ORIGIN SCENARIO SUPERVISOR MEMORY NAME OUT]
 	@$(WITH_ROS) $(SIMULATION)/train $(call option,--preset,PRESET) $(call option,--reward,REWARD) \
 	  $(call option,--seed,SEED) $(call option,--steps,STEPS) $(call option,--map,MAP) \
 	  $(call option,--route,ROUTE) $(call option,--origin,ORIGIN) \
-	  $(call option,--scenario,SCENARIO) $(call option,--name,NAME) $(call option,--out,OUT) $(ARGS)
+	  $(call option,--scenario,SCENARIO) $(call option,--supervisor,SUPERVISOR) \
+	  $(call option,--memory,MEMORY) $(call option,--name,NAME) $(call option,--out,OUT) $(ARGS)
 
 trainings: ## train all policies of the evaluation, one after another [SEEDS='0 1 2']
 	@$(WITH_ROS) bash -c 'for seed in $(SEEDS); do \

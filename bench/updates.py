@@ -40,6 +40,7 @@ def random_sample(batch: int) -> Sample:
             r_t=random.uniform(-1.0, 1.0, batch).astype(np.float32),
             discount_t=np.full(batch, 0.99, dtype=np.float32),
             s_t=random.uniform(-1.0, 1.0, size).astype(np.float32),
+            sound_t=np.ones((batch, 3), dtype=np.bool_),
         ),
     )
 

@@ -13,7 +13,7 @@ from risk_dqn_planner.policies.fastest_sound import what_forbids
 from risk_dqn_planner.policies.fingerprint import fingerprint
 from risk_dqn_planner.safety.assumptions import SafetyAssumptions
 from risk_dqn_planner.safety.guard import Guard
-from risk_dqn_planner.situation.situations import Booleans, Situations
+from risk_dqn_planner.situation.situations import Booleans, Floats, Integers, Situations
 
 # For each proposed action the others in the order in which they stand in: slower ones first.
 _INSTEAD: NDArray[np.int64] = np.array(
@@ -49,8 +49,10 @@ def supervisor_mode(name: str) -> SupervisorMode:
 class Supervisor:
     """Any policy, its actions checked for what they leave the ego to do.
 
-    An action that is not sound is replaced by the fastest sound one below it, else by the
-    slowest one above. Where the check admits none, the manoeuvre verified last is carried on.
+    An action that is not sound is replaced by the sound one of the highest Q value, as in training
+    under the supervisor; where the policy gives no Q values, by the fastest sound one below it,
+    else by the slowest one above. Where the check admits none, the manoeuvre verified last is
+    carried on.
     """
 
     def __init__(
@@ -90,10 +92,7 @@ class Supervisor:
             return decisions
         proposed = np.asarray(decisions.action, dtype=np.int64)
         check = self._guard.look(situations, restart)
-        sound = self._guard.sound(check)
-        order = _INSTEAD[proposed]
-        best = np.take_along_axis(sound, order, axis=1).argmax(axis=1)[:, None]
-        allowed = np.take_along_axis(order, best, axis=1)[:, 0]
+        allowed = _allowed(self._guard.sound(check), proposed, decisions.q_values)
         at_goal = decisions.reason == Reason.GOAL_REACHED
         unsound = (allowed != proposed) & ~at_goal
         enforced = unsound & (self.mode is SupervisorMode.ENFORCE)
@@ -114,3 +113,14 @@ class Supervisor:
             proposed=proposed,
             lacking_s=np.where(unsound, lacking_s, np.nan),
         )
+
+
+def _allowed(sound: Booleans, proposed: Integers, q_values: Floats) -> Integers:
+    """Return the proposed actions (B,) where they are sound (B, 3), else what stands in."""
+    order = _INSTEAD[proposed]
+    first = np.take_along_axis(sound, order, axis=1).argmax(axis=1)[:, None]
+    by_speed = np.take_along_axis(order, first, axis=1)[:, 0]
+    by_value = np.where(sound, q_values, -np.inf).argmax(axis=1)
+    valued = np.isfinite(q_values).all(axis=1)
+    kept = np.take_along_axis(sound, proposed[:, None], axis=1)[:, 0]
+    return np.where(kept, proposed, np.where(valued, by_value, by_speed))

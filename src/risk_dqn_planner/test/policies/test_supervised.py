@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from risk_dqn_planner.decision import explain
 from risk_dqn_planner.errors import ConfigurationError
@@ -81,6 +82,31 @@ def test_the_fastest_sound_action_below_the_proposed_one_stands_in(situation: Ma
     # Slow is sound here and Fast is not, see test_fastest_sound.
     s = situation([{"id": 3, "ego_m": 8.5, "hidden_m": -3.0}], ego_mps=5.0)
     assert decide(s, Action.FAST)[0].action[0] == Action.SLOW
+
+
+class Valued:
+    """A policy that wants what its Q values say."""
+
+    name = hash = "valued"
+
+    def __init__(self, *q_values: float) -> None:
+        self._q_values = np.array([q_values])
+
+    def decide(self, situations: Situations, restart: NDArray[np.bool_]) -> Decisions:
+        decisions = ConstantPolicy(Action.STOP).decide(situations, restart)
+        return decisions._replace(action=self._q_values.argmax(axis=1), q_values=self._q_values)
+
+
+@pytest.mark.parametrize(
+    ("q_values", "expected"),
+    [((1.0, 0.0, 2.0), Action.STOP), ((0.0, 1.0, 2.0), Action.SLOW), ((0.0, 2.0, 1.0), 1)],
+)
+def test_of_sound_actions_that_with_the_highest_value_stands_in(
+    situation: Make, q_values: tuple[float, ...], expected: Action
+) -> None:
+    # Stop and Slow are sound here and Fast is not, see test_fastest_sound.
+    s = situation([{"id": 3, "ego_m": 8.5, "hidden_m": -3.0}], ego_mps=5.0)
+    assert Supervisor(Valued(*q_values)).decide(s, NEW).action[0] == expected
 
 
 def test_where_stopping_is_not_sound_the_ego_is_driven_on(situation: Make) -> None:

@@ -7,7 +7,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from risk_dqn_planner.policies.base import Action
 from risk_dqn_planner.risk.config import RiskConfig
+from risk_dqn_planner.safety.guard import Guard
+from risk_dqn_planner.safety.joint_check import JointCheck
+from risk_dqn_planner.situation.situations import Booleans
 from risk_dqn_planner.state.history import StateEncoder
 from sim_bridge.environment.interface import EnvironmentStep, Outcome, States
 from sim_bridge.environment.rewards import RewardConfig, rewards
@@ -40,14 +44,22 @@ class BatchEnvironment:
         risk: RiskConfig,
         run_seed: int,
         first: int = 0,
+        guard: Guard | None = None,
     ) -> None:
-        """Take a simulation; `first`: number of its first environment among all of the run."""
+        """Take a simulation.
+
+        first: number of its first environment among all of the run. guard: tells which actions
+        are sound on what is perceived; with none of them all are.
+        """
         self._simulation = simulation
         self._encoder = encoder
         self._reward = reward
         self._risk = risk
         self._run_seed = run_seed
         self._first = first
+        self._guard = guard
+        self._check: JointCheck | None = None
+        self._sound = np.ones((simulation.batch, len(Action)), dtype=np.bool_)
         self._begun = np.zeros(self.batch, dtype=np.int64)
         self._ended = np.zeros(self.batch, dtype=np.bool_)
         self._situations = simulation.situations()
@@ -69,6 +81,11 @@ class BatchEnvironment:
         """How many numbers a state has."""
         return int(self._states[0].size)
 
+    @property
+    def sound(self) -> Booleans:
+        """Which actions (B, 3) may be taken now: all of them without a guard."""
+        return self._sound
+
     def reset(self, seeds: Seeds | None = None) -> States:
         """Begin the next episode of each environment, or those of `seeds` (B,).
 
@@ -82,7 +99,11 @@ class BatchEnvironment:
     def step(self, actions: NDArray[np.int64]) -> EnvironmentStep:
         """Take one action (B,) in each environment, or begin the next episode where one ended."""
         begin = self._ended
+        if self._guard is not None and self._check is not None:
+            self._guard.decided(self._check, actions)
+        before = self._manners()
         result = self._simulation.step(actions)
+        manners = [now > then for now, then in zip(self._manners(), before, strict=True)]
         outcome = outcomes(result)
         if begin.any():
             self._begin(begin)
@@ -93,6 +114,7 @@ class BatchEnvironment:
             self._situations,
             outcome == Outcome.COLLISION,
             outcome == Outcome.SUCCESS,
+            *manners,
         )
         self._ended = outcome != Outcome.RUNNING
         terminated = self._ended & (outcome != Outcome.TIMEOUT)
@@ -113,7 +135,17 @@ class BatchEnvironment:
     def _perceive(self, restart: NDArray[np.bool_]) -> States:
         self._simulation.situations(out=self._situations)
         self._encoder.encode(self._situations, restart, out=self._states)
+        if self._guard is not None:
+            self._check = self._guard.look(self._situations, restart)
+            self._sound = self._guard.sound(self._check)
         return self._states.reshape(self.batch, -1)
+
+    def _manners(self) -> list[NDArray[np.int64]]:
+        """Return how often (B,) each ego has changed its action and braked hard, if it counts."""
+        if not self._reward.prices_manners:
+            return []
+        counts = self._simulation.state.counts
+        return [counts.action_changes.copy(), counts.hard_brakes.copy()]
 
     def state_dict(self) -> dict[str, Any]:
         """Return everything that `load_state_dict` needs to go on identically."""
@@ -123,6 +155,7 @@ class BatchEnvironment:
             "encoder": copy.deepcopy(self._encoder),
             "begun": self._begun.copy(),
             "ended": self._ended.copy(),
+            "guard": copy.deepcopy((self._guard, self._check, self._sound)),
         }
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
@@ -133,3 +166,6 @@ class BatchEnvironment:
         self._encoder = copy.deepcopy(state["encoder"])
         self._begun[:] = state["begun"]
         self._ended = state["ended"].copy()
+        # Nor a guard.
+        if "guard" in state:
+            self._guard, self._check, self._sound = copy.deepcopy(state["guard"])

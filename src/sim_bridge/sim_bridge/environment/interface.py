@@ -11,6 +11,8 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from risk_dqn_planner.situation.situations import Booleans
+
 States = NDArray[np.float32]
 
 
@@ -41,7 +43,10 @@ class EnvironmentStep(NamedTuple):
 
 
 class Environment(Protocol):
-    """B environments with a state of F numbers and the actions 0, 1, 2."""
+    """B environments with a state of F numbers and the actions 0, 1, 2.
+
+    What is not sound must not be taken; at least one action always is.
+    """
 
     @property
     def batch(self) -> int:
@@ -50,6 +55,10 @@ class Environment(Protocol):
     @property
     def features(self) -> int:
         """F."""
+
+    @property
+    def sound(self) -> Booleans:
+        """Which actions (B, 3) may be taken now: all of them without a supervisor."""
 
     def reset(self) -> States:
         """Begin the first episode of each environment; return the states (B, F)."""

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from risk_dqn_planner.errors import ConfigurationError
+from risk_dqn_planner.situation.situations import Booleans
 from sim_bridge.environment.interface import Environment, EnvironmentStep, States
 
 
@@ -48,6 +49,11 @@ class SideBySide:
     def features(self) -> int:
         """How many numbers a state has."""
         return self._parts[0].features
+
+    @property
+    def sound(self) -> Booleans:
+        """Which actions (B, 3) may be taken now."""
+        return np.concatenate([part.sound for part in self._parts])
 
     def reset(self) -> States:
         """Begin the first episode of each environment; return the states (B, F)."""

@@ -53,7 +53,7 @@ class RunFolder:
         self.path.mkdir(parents=True, exist_ok=True)
         partial = self.path / (CHECKPOINT + ".partial")
         with partial.open("wb") as file:
-            content = {"run": asdict(self._run), "session": session.state_dict()}
+            content = {"run": self._run.description(), "session": session.state_dict()}
             pickle.dump(content, file, protocol=pickle.HIGHEST_PROTOCOL)
         partial.replace(self.path / CHECKPOINT)
         self._write_json(HISTORY, [asdict(record) for record in session.records])
@@ -86,7 +86,7 @@ class RunFolder:
             raise ConfigurationError("a run that was never validated has no policy to write")
         self.path.mkdir(parents=True, exist_ok=True)
         outcome = {
-            "run": asdict(self._run),
+            "run": self._run.description(),
             "best_steps": best.steps,
             "validation": asdict(best.score),
         }
@@ -106,7 +106,7 @@ class RunFolder:
         return policy
 
     def _require_same(self, found: object) -> None:
-        expected = asdict(self._run)
+        expected = self._run.description()
         if found != expected:
             raise ConfigurationError(
                 f"{self.path} holds another training run, expected {expected}; "

@@ -12,7 +12,12 @@ from sim_bridge.learning import compiled_network as network
 from sim_bridge.learning.compiled_network import Signals, empty_signals
 from sim_bridge.learning.config import LearnerConfig
 from sim_bridge.learning.dense import Adam, Array, adam_step, mix, shorten
-from sim_bridge.learning.losses import double_q_target, weighted_loss, weighted_loss_slope
+from sim_bridge.learning.losses import (
+    double_q_target,
+    rule_out,
+    weighted_loss,
+    weighted_loss_slope,
+)
 from sim_bridge.learning.replay import Sample, Transitions
 
 
@@ -56,6 +61,7 @@ def _update(
     count = batch.r_t.shape[0]
     work.by.q[:] = 0.0
     for k in range(count):
+        rule_out(work.next_online.q[k], batch.sound_t[k])
         y = double_q_target(
             batch.r_t[k], batch.discount_t[k], work.next_online.q[k], work.next_target.q[k]
         )

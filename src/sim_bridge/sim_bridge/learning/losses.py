@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from risk_dqn_planner.compiled import kernel
 
 Array = NDArray[np.float32]
+Booleans = NDArray[np.bool_]
 
 
 @kernel
@@ -20,6 +21,14 @@ def double_q_target(r_t: float, discount_t: float, q_t_online: Array, q_t_target
     """
     value: float = r_t + discount_t * q_t_target[np.argmax(q_t_online)]
     return value
+
+
+@kernel
+def rule_out(q: Array, sound: Booleans) -> None:
+    """Make sure that no action is chosen by its Q-values (A,) unless it is sound (A,)."""
+    for action in range(q.shape[0]):
+        if not sound[action]:
+            q[action] = -np.inf
 
 
 @kernel

@@ -91,6 +91,7 @@ def _training(origin: Origin) -> str:
         ["reward", origin.reward],
         ["scenarios", ", ".join(origin.scenarios)],
         ["maps", ", ".join(origin.maps)],
+        *([name, value] for name, value in origin.company),
         ["seed", str(origin.seed)],
         ["environment steps", str(origin.steps)],
         ["best on validation after", f"{origin.best_steps} steps"],

@@ -60,6 +60,7 @@ def _push(
             out.r_t[written] = pending.returns[e, k]
             out.discount_t[written] = pending.discounts[e, k]
             out.s_t[written] = step.s_t[e]
+            out.sound_t[written] = step.sound_t[e]
             written += 1
         pending.held[e] -= max(due, 0)
     return written

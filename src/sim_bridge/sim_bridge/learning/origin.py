@@ -12,7 +12,12 @@ from risk_dqn_planner.policies.policy_file import load_policy_file
 from sim_bridge.learning.presets import PRESETS
 
 # What `train` takes where it is not told otherwise.
-_DEFAULTS = {"map_name": "four_way", "scenario": "base"}
+_DEFAULTS = {
+    "map_name": "four_way",
+    "scenario": "base",
+    "supervisor": "off",
+    "memory": "instantaneous",
+}
 
 
 @dataclass(frozen=True)
@@ -58,6 +63,13 @@ class Origin:
         return int(self.run["config"]["steps"])
 
     @property
+    def company(self) -> list[tuple[str, str]]:
+        """What it learned under, by name: an enforcing supervisor, a memory of hidden space."""
+        return [
+            (name, str(self.run[name])) for name in ("supervisor", "memory") if name in self.run
+        ]
+
+    @property
     def default_name(self) -> str:
         """The name that training gives when it is not told another."""
         return f"{self.reward}_{self.preset}"
@@ -73,7 +85,7 @@ class Origin:
         if preset is None or preset.steps != self.steps:
             words.append(f"STEPS={self.steps}")
         for key, default in _DEFAULTS.items():
-            value = str(self.run[key])
+            value = str(self.run.get(key, default))
             if value != default:
                 words.append(f"{key.removesuffix('_name').upper()}={shlex.quote(value)}")
         if self.name != self.default_name:

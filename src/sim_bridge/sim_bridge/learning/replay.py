@@ -12,12 +12,14 @@ from numpy.typing import NDArray
 
 from risk_dqn_planner.compiled import kernel
 from risk_dqn_planner.errors import ConfigurationError
+from risk_dqn_planner.policies.base import Action
 from sim_bridge.learning import sum_tree
 from sim_bridge.learning.config import ReplayConfig
 
 Float32s = NDArray[np.float32]
 Float64s = NDArray[np.float64]
 Integers = NDArray[np.int64]
+Booleans = NDArray[np.bool_]
 
 
 class Transitions(NamedTuple):
@@ -25,7 +27,7 @@ class Transitions(NamedTuple):
 
     s_tm1, s_t (K, F) float32, flattened states; a_tm1 (K,) int64; r_t, discount_t (K,)
     float32. discount_t is 0 where the episode terminated and gamma^n else, also at a time
-    limit: termination is data, not a branch.
+    limit: termination is data, not a branch. sound_t (K, 3) bool: actions that may be taken in s_t.
     """
 
     s_tm1: Float32s
@@ -33,6 +35,7 @@ class Transitions(NamedTuple):
     r_t: Float32s
     discount_t: Float32s
     s_t: Float32s
+    sound_t: Booleans
 
 
 class Sample(NamedTuple):
@@ -54,6 +57,7 @@ def empty_transitions(count: int, features: int) -> Transitions:
         r_t=np.zeros(count, dtype=np.float32),
         discount_t=np.zeros(count, dtype=np.float32),
         s_t=np.zeros((count, features), dtype=np.float32),
+        sound_t=np.ones((count, len(Action)), dtype=np.bool_),
     )
 
 
@@ -75,6 +79,7 @@ def _copy_rows(source: Transitions, rows: Integers, target: Transitions) -> None
         target.r_t[k] = source.r_t[row]
         target.discount_t[k] = source.discount_t[row]
         target.s_t[k] = source.s_t[row]
+        target.sound_t[k] = source.sound_t[row]
 
 
 @kernel
@@ -175,7 +180,8 @@ class PrioritizedReplay:
     def load_state_dict(self, state: dict[str, Any]) -> None:
         """Take over a state; the capacity must be the one it was saved with."""
         size = len(state["leaves"])
-        for stored, saved in zip(_arrays(self._memory), state["memory"], strict=True):
+        # Runs from before actions were ruled out have no sound_t: there all of them are.
+        for stored, saved in zip(_arrays(self._memory), state["memory"], strict=False):
             stored[:size] = saved
         self._tree[:] = 0.0
         sum_tree.assign(self._tree, np.arange(size), state["leaves"])

@@ -8,12 +8,18 @@ Its whole state can be saved and taken over, so that an interrupted run ends in 
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
 
+from risk_dqn_planner.errors import ConfigurationError
+from risk_dqn_planner.policies.base import Policy
+from risk_dqn_planner.policies.supervised import Supervisor, SupervisorMode, supervisor_mode
 from risk_dqn_planner.risk.config import RiskConfig
+from risk_dqn_planner.safety.assumptions import SafetyAssumptions
+from risk_dqn_planner.safety.guard import Guard
+from risk_dqn_planner.situation.config import INSTANTANEOUS, require_memory
 from risk_dqn_planner.state.encoding import StateConfig
 from risk_dqn_planner.state.history import StateEncoder
 from sim_bridge.environment.batch import BatchEnvironment
@@ -36,7 +42,9 @@ from sim_bridge.simulation.simulation import Simulation
 class Run:
     """What is trained: all that decides the result, but for the maps' files.
 
-    map_name, scenario: one name, or several with commas between them.
+    map_name, scenario: one name, or several with commas between them. supervisor: `enforce` lets
+    only actions be taken, learned from and validated that are sound under `assumptions`; `off`
+    lets all be. memory: how the planner tells where hidden vehicles may be, see SituationConfig.
     """
 
     config: TrainingConfig
@@ -44,6 +52,35 @@ class Run:
     seed: int
     map_name: str
     scenario: str
+    supervisor: str = SupervisorMode.OFF.value
+    memory: str = INSTANTANEOUS
+    assumptions: SafetyAssumptions = field(default_factory=SafetyAssumptions)
+
+    def __post_init__(self) -> None:
+        require_memory(self.memory)
+        if supervisor_mode(self.supervisor) is SupervisorMode.REPORT:
+            raise ConfigurationError(
+                "supervisor is 'report', which changes nothing in training, "
+                "expected one of: off, enforce"
+            )
+
+    @property
+    def supervised(self) -> bool:
+        """Whether the supervisor enforces sound actions."""
+        return supervisor_mode(self.supervisor) is SupervisorMode.ENFORCE
+
+    def description(self) -> dict[str, Any]:
+        """Return all of it as JSON; what is not used is left out.
+
+        So a run without supervisor and memory is described, and its policy's file written, as
+        before there was either.
+        """
+        found = asdict(self)
+        if not self.supervised:
+            del found["supervisor"], found["assumptions"]
+        if self.memory == INSTANTANEOUS:
+            del found["memory"]
+        return found
 
     @property
     def map_names(self) -> list[str]:
@@ -114,10 +151,10 @@ class Best:
 Course = tuple[Place, Scenario]
 
 
-def _simulations(courses: Sequence[Course], count: int) -> list[Simulation]:
+def _simulations(courses: Sequence[Course], count: int, memory: str) -> list[Simulation]:
     """Divide so many episodes among the courses."""
     return [
-        place.simulation(scenario, share)
+        place.simulation(scenario, share, memory)
         for (place, scenario), share in zip(courses, shares_of(count, len(courses)), strict=True)
     ]
 
@@ -140,15 +177,15 @@ class Session:
         environment = self._environment(courses)
         self._learner = Learner(run.config.learner, initial_weights)
         self._trainer = Trainer(run.config, environment, self._learner, run.seed)
-        self._evaluation = _simulations(courses, evaluation.episodes)
-        self._validation = _simulations(courses, evaluation.validation_episodes)
+        self._evaluation = _simulations(courses, evaluation.episodes, run.memory)
+        self._validation = _simulations(courses, evaluation.validation_episodes, run.memory)
         self.records: list[Record] = []
         self.best: Best | None = None
 
     def _environment(self, courses: Sequence[Course]) -> Environment:
         run = self.run_description
         parts: list[BatchEnvironment] = []
-        for simulation in _simulations(courses, run.config.environments):
+        for simulation in _simulations(courses, run.config.environments, run.memory):
             part = BatchEnvironment(
                 simulation=simulation,
                 encoder=StateEncoder(self.state_config),
@@ -156,6 +193,7 @@ class Session:
                 risk=RiskConfig(),
                 run_seed=run.seed,
                 first=sum(part.batch for part in parts),
+                guard=Guard(run.assumptions) if run.supervised else None,
             )
             parts.append(part)
         return SideBySide(parts) if len(parts) > 1 else parts[0]
@@ -198,7 +236,10 @@ class Session:
         )
 
     def _score(self, simulations: Sequence[Simulation]) -> Score:
-        policy = GreedyPolicy(self._learner, StateEncoder(self.state_config))
+        run = self.run_description
+        policy: Policy = GreedyPolicy(self._learner, StateEncoder(self.state_config))
+        if run.supervised:
+            policy = Supervisor(policy, assumptions=run.assumptions)
         seeds = fixed_seeds(VALIDATION_SEEDS, max(each.batch for each in simulations))
         return Score.of([drive(each, policy, seeds[: each.batch]) for each in simulations])
 

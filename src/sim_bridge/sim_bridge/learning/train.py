@@ -47,6 +47,8 @@ def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
     add("--route", help="of an .osm file: lanelet ids, separated by commas")
     add("--origin", help="of an .osm file: latitude,longitude of its projection [deg]")
     add("--scenario", default="base", help="names or .yaml files, by commas [%(default)s]")
+    add("--supervisor", default="off", help="off or enforce: take sound actions only [%(default)s]")
+    add("--memory", default="instantaneous", help="or tracked: of free space seen [%(default)s]")
     add("--name", help="name of the policy [REWARD_PRESET]")
     add("--out", type=Path, help="output folder [out/training/REWARD_PRESET_seedSEED]")
     return parser.parse_args(argv)
@@ -125,7 +127,13 @@ def main(argv: Sequence[str] | None = None) -> int:
         origin = MapOrigin.from_text(arguments.origin) if arguments.origin else None
         route = None if arguments.route is None else parse_route(arguments.route)
         run = Run(
-            _config(arguments), arguments.reward, arguments.seed, arguments.map, arguments.scenario
+            config=_config(arguments),
+            reward=arguments.reward,
+            seed=arguments.seed,
+            map_name=arguments.map,
+            scenario=arguments.scenario,
+            supervisor=arguments.supervisor,
+            memory=arguments.memory,
         )
         places = [load_place(name, route, origin) for name in run.map_names]
         folder = RunFolder(out, run)

@@ -50,6 +50,7 @@ class Trainer:
         )
         self._random = np.random.default_rng([seed, 1])
         self._states = environment.reset().copy()
+        self._sound = environment.sound.copy()
         self._steps = 0
         self._episodes = 0
         self._updates = 0
@@ -81,9 +82,11 @@ class Trainer:
         actions = self._choose_actions()
         step = self._environment.step(actions)
         ended = step.outcome != Outcome.RUNNING
-        single = Transitions(self._states, actions, step.reward, step.discount, step.states)
+        sound = self._environment.sound
+        single = Transitions(self._states, actions, step.reward, step.discount, step.states, sound)
         self._replay.add(self._returns.push(single, step.taken, ended))
         self._states[:] = step.states
+        self._sound[:] = sound
         taken = int(step.taken.sum())
         self._steps += taken
         self._ended += np.bincount(step.outcome, minlength=len(Outcome))
@@ -93,14 +96,23 @@ class Trainer:
                 self._learn()
 
     def _choose_actions(self) -> NDArray[np.int64]:
-        """Choose epsilon-greedily for each environment; as many random numbers each time."""
+        """Choose epsilon-greedily for each environment, among the sound actions alone."""
         batch = self._environment.batch
         explore = self._random.random(batch) < self._config.exploration.epsilon(self.progress)
-        actions = self._random.integers(0, len(Action), batch)
+        actions = self._any_actions()
         if explore.all():
             return actions
-        greedy = self._learner.q_values(self._states).argmax(axis=1)
+        values = self._learner.q_values(self._states)
+        greedy = np.where(self._sound, values, -np.inf).argmax(axis=1)
         return np.where(explore, actions, greedy)
+
+    def _any_actions(self) -> NDArray[np.int64]:
+        """Draw a sound action for each environment, all of them with equal chances."""
+        batch = self._environment.batch
+        actions = self._random.integers(0, len(Action), batch)
+        while not (sound := self._sound[np.arange(batch), actions]).all():
+            actions = np.where(sound, actions, self._random.integers(0, len(Action), batch))
+        return actions
 
     def _learn(self) -> None:
         drawn = self._replay.sample(
@@ -141,6 +153,7 @@ class Trainer:
             "environment": self._environment.state_dict(),
             "random": self._random.bit_generator.state,
             "states": self._states.copy(),
+            "sound": self._sound.copy(),
             "counts": (self._steps, self._episodes, self._updates, self._reports),
         }
 
@@ -152,5 +165,7 @@ class Trainer:
         self._environment.load_state_dict(state["environment"])
         self._random.bit_generator.state = state["random"]
         self._states[:] = state["states"]
+        # Runs from before actions were ruled out know no other than sound ones.
+        self._sound[:] = state.get("sound", True)
         self._steps, self._episodes, self._updates, self._reports = state["counts"]
         self._restart_report()

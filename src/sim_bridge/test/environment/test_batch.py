@@ -4,9 +4,11 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from risk_dqn_planner.policies.base import Action
 from risk_dqn_planner.risk.config import RiskConfig
+from risk_dqn_planner.safety.guard import Guard
 from risk_dqn_planner.state.history import StateEncoder
 from sim_bridge.environment.batch import BatchEnvironment
 from sim_bridge.environment.interface import EnvironmentStep, Outcome
@@ -34,6 +36,25 @@ def environment(
     return BatchEnvironment(
         simulation(batch, limit_s), StateEncoder(), reward_named(reward), RiskConfig(), seed
     )
+
+
+def guarded(batch: int, scenario: str = "base", reward: str = "progress") -> BatchEnvironment:
+    return BatchEnvironment(
+        place().simulation(load_scenario(scenario), batch),
+        StateEncoder(),
+        reward_named(reward),
+        RiskConfig(),
+        run_seed=0,
+        guard=Guard(),
+    )
+
+
+def any_sound(one: BatchEnvironment, random: np.random.Generator) -> NDArray[np.int64]:
+    """Draw among the sound actions of each row."""
+    drawn: NDArray[np.int64] = np.where(one.sound, random.random((one.batch, 3)), -1.0).argmax(
+        axis=1
+    )
+    return drawn
 
 
 def keep(step: EnvironmentStep) -> EnvironmentStep:
@@ -123,3 +144,54 @@ def test_restored_environment_goes_on_identically() -> None:
 def test_given_seeds_begin_those_episodes() -> None:
     one, other = environment(2), environment(2, seed=5)
     np.testing.assert_array_equal(one.reset(np.array([3, 4])), other.reset(np.array([3, 4])))
+
+
+def test_without_a_guard_every_action_is_sound() -> None:
+    one = environment(3)
+    one.reset()
+    one.step(fast(3))
+    assert one.sound.shape == (3, 3)
+    assert one.sound.all()
+
+
+@pytest.mark.parametrize("scenario", ["base", "dense_traffic", "severe_occlusion"])
+def test_what_takes_only_sound_actions_never_collides(scenario: str) -> None:
+    one, random = guarded(64, scenario), np.random.default_rng(2)
+    one.reset()
+    ruled_out, ended = 0, 0
+    for _ in range(150):
+        assert one.sound.any(axis=1).all()
+        ruled_out += int((~one.sound).sum())
+        outcome = one.step(any_sound(one, random)).outcome
+        assert not (outcome == Outcome.COLLISION).any()
+        ended += int((outcome == Outcome.SUCCESS).sum())
+    assert ruled_out > 100
+    assert ended > 0 or scenario == "severe_occlusion"
+
+
+def test_switching_and_hard_braking_are_priced_as_the_statistics_count_them() -> None:
+    one = environment(4, reward="progress")
+    one.reset()
+    changes, brakes = np.zeros(4, dtype=np.int64), np.zeros(4, dtype=np.int64)
+    for action in (2, 2, 2, 2, 0, 0, 1, 1):
+        step = one.step(np.full(4, action, dtype=np.int64))
+        assert (step.outcome == Outcome.RUNNING).all()
+        statistics = one.simulation.statistics()
+        now = statistics.action_changes - changes, statistics.hard_brakes - brakes
+        assert step.reward == pytest.approx(-0.01 - 0.03 * (now[0] + now[1]))
+        changes, brakes = statistics.action_changes, statistics.hard_brakes
+    assert changes.tolist() == [2] * 4
+    assert (brakes > 0).all()
+
+
+def test_a_guarded_environment_goes_on_identically_when_restored() -> None:
+    one, other, random = guarded(8), guarded(8), np.random.default_rng(0)
+    one.reset()
+    for _ in range(40):
+        one.step(any_sound(one, random))
+    other.load_state_dict(one.state_dict())
+    for _ in range(60):
+        np.testing.assert_array_equal(one.sound, other.sound)
+        actions = any_sound(one, random)
+        for a, b in zip(one.step(actions), other.step(actions), strict=True):
+            np.testing.assert_array_equal(a, b)

@@ -27,9 +27,16 @@ def situation(
     return s
 
 
-def reward(name: str, s: Situations, collided: bool = False, at_goal: bool = False) -> float:
-    values = rewards(reward_named(name), RiskConfig(), s, np.array([collided]), np.array([at_goal]))
-    return float(values[0])
+def reward(
+    name: str,
+    s: Situations,
+    collided: bool = False,
+    at_goal: bool = False,
+    switched: bool = False,
+    hard_braked: bool = False,
+) -> float:
+    how = (np.array([each]) for each in (collided, at_goal, switched, hard_braked))
+    return float(rewards(reward_named(name), RiskConfig(), s, *how)[0])
 
 
 def test_risk_pays_a_fifth_of_the_share_of_top_speed_where_all_is_safe() -> None:
@@ -60,6 +67,21 @@ def test_collision_pays_for_events_alone() -> None:
     assert reward("collision", s, collided=True) == -2.0
     assert reward("collision", s, at_goal=True) == 1.0
     assert reward("collision", s) == pytest.approx(-0.00001)
+
+
+def test_progress_pays_for_time_for_switching_and_for_hard_braking() -> None:
+    s = situation(5.0, 4.0, vehicle=True)
+    assert reward("progress", s) == pytest.approx(-0.01)
+    assert reward("progress", s, switched=True) == pytest.approx(-0.04)
+    assert reward("progress", s, switched=True, hard_braked=True) == pytest.approx(-0.07)
+    assert reward("progress", s, at_goal=True) == 1.0
+
+
+def test_joint_risk_is_progress_and_some_of_the_risk() -> None:
+    # Risk -1 as above: where the ego can neither stop nor leave first.
+    s = situation(5.0, 4.0, vehicle=True)
+    assert reward("joint_risk", s, switched=True) == pytest.approx(-0.04 - 0.02)
+    assert reward("collision", s, switched=True) == reward("collision", s)
 
 
 def test_an_unknown_reward_is_refused_by_name() -> None:

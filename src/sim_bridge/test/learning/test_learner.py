@@ -49,6 +49,7 @@ def sample(discount: float = 0.99, count: int = 16) -> Sample:
             r_t=random.normal(size=count).astype(np.float32),
             discount_t=np.full(count, discount, dtype=np.float32),
             s_t=states(count, 2),
+            sound_t=np.ones((count, 3), dtype=np.bool_),
         ),
         indices=np.arange(count),
         weights=random.random(count).astype(np.float32),
@@ -85,7 +86,7 @@ def test_updates_are_adam_steps_on_the_double_q_loss() -> None:
     online, target = network(weights), network(weights)
     optimizer = torch.optim.Adam(online.parameters(), lr=0.01)
     drawn = sample()
-    s_tm1, a_tm1, r_t, discount_t, s_t = (torch.from_numpy(x) for x in drawn.transitions)
+    s_tm1, a_tm1, r_t, discount_t, s_t, _ = (torch.from_numpy(x) for x in drawn.transitions)
     s_tm1, s_t = s_tm1.reshape(-1, 5, 3, 8), s_t.reshape(-1, 5, 3, 8)
     for _ in range(3):
         with torch.no_grad():
@@ -105,6 +106,19 @@ def test_updates_are_adam_steps_on_the_double_q_loss() -> None:
     np.testing.assert_allclose(
         learner.weights, flat(list(online.parameters())), rtol=1e-3, atol=1e-4
     )
+
+
+def test_the_target_is_the_value_of_the_best_sound_action() -> None:
+    weights, drawn = initial_weights(0), sample()
+    only = np.random.default_rng(7).integers(0, 3, 16)
+    drawn.transitions.sound_t[:] = only[:, None] == np.arange(3)
+    next_q = Learner(LearnerConfig(), weights).q_values(drawn.transitions.s_t).copy()
+    now_q = Learner(LearnerConfig(), weights).q_values(drawn.transitions.s_tm1).copy()
+    errors, _ = Learner(LearnerConfig(), weights).update(drawn, progress=0.0)
+    rows = np.arange(16)
+    y = drawn.transitions.r_t + 0.99 * next_q[rows, only]
+    expected = y - now_q[rows, drawn.transitions.a_tm1]
+    np.testing.assert_allclose(errors, expected, rtol=1e-4, atol=1e-5)
 
 
 def test_target_moves_a_fifth_of_the_way_after_each_update() -> None:

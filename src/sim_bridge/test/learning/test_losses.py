@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from sim_bridge.learning.losses import double_q_target, weighted_loss, weighted_loss_slope
+from sim_bridge.learning.losses import double_q_target, rule_out, weighted_loss, weighted_loss_slope
 
 
 def q(*values: float) -> NDArray[np.float32]:
@@ -15,6 +15,12 @@ def q(*values: float) -> NDArray[np.float32]:
 def test_online_network_chooses_and_target_network_values() -> None:
     # The online network prefers action 2, which the target values at 10, not at its own best 30.
     assert double_q_target(1.0, 0.5, q(1, 2, 3), q(30, 20, 10)) == 6.0
+
+
+def test_an_action_that_is_ruled_out_is_not_chosen() -> None:
+    online = q(1, 2, 3)
+    rule_out(online, np.array([True, True, False]))
+    assert double_q_target(1.0, 0.5, online, q(30, 20, 10)) == 11.0
 
 
 def test_a_terminated_step_is_worth_its_reward_alone() -> None:

@@ -15,12 +15,13 @@ def one_step(number: int, reward: float, discount: float = 1.0) -> Transitions:
         r_t=np.array([reward], dtype=np.float32),
         discount_t=np.array([discount], dtype=np.float32),
         s_t=np.array([[number + 1]], dtype=np.float32),
+        sound_t=np.array([[True, number % 2 == 0, False]]),
     )
 
 
 def push(returns: NStepReturns, step: Transitions, ended: bool = False) -> list[tuple[float, ...]]:
     """Return completed transitions as (s, a, r, discount, s')."""
-    out = returns.push(step, np.array([True]), np.array([ended]))
+    *out, _ = returns.push(step, np.array([True]), np.array([ended]))
     return [
         (float(s[0]), int(a), float(r), float(d), float(n[0]))
         for s, a, r, d, n in zip(*out, strict=True)
@@ -96,6 +97,16 @@ def test_a_step_that_was_not_taken_leaves_no_trace() -> None:
     out = returns.push(one_step(7, 99.0), np.array([False]), np.array([True]))
     assert len(out.r_t) == 0
     assert push(returns, one_step(1, 4.0)) == [(0, 0, 10.0, 0.25, 2)]
+
+
+def test_what_is_sound_goes_with_the_state_that_was_reached() -> None:
+    returns = NStepReturns(1, 3, GAMMA, 1)
+    taken, ended = np.array([True]), np.array([True])
+    for number in range(2):
+        returns.push(one_step(number, 1.0), taken, ~ended)
+    # Step 2 reaches state 3, in which 0 and 1 are sound; so it is said of all that end there.
+    out = returns.push(one_step(2, 1.0), taken, ended)
+    assert out.sound_t.tolist() == [[True, True, False]] * 3
 
 
 def test_restored_sums_go_on_identically() -> None:

@@ -125,7 +125,8 @@ def test_drawn_rows_are_the_stored_transitions() -> None:
     drawn = filled(ReplayConfig(capacity=8), [0.1] * 8).sample(5, 0.4)
     for array in drawn.transitions:
         expected = drawn.indices.reshape(-1, *[1] * (array.ndim - 1))
-        np.testing.assert_array_equal(array, np.broadcast_to(expected, array.shape))
+        rows = np.broadcast_to(expected, array.shape).astype(array.dtype)
+        np.testing.assert_array_equal(array, rows)
 
 
 def test_a_restored_memory_draws_the_same() -> None:

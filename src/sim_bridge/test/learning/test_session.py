@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 import json
-from dataclasses import replace
+from dataclasses import asdict, replace
 from functools import lru_cache
 from pathlib import Path
 
@@ -8,14 +8,25 @@ import numpy as np
 import pytest
 
 from risk_dqn_planner.errors import ConfigurationError
+from risk_dqn_planner.policies.base import StopsAtGoal
 from risk_dqn_planner.policies.learned import LearnedPolicy
 from risk_dqn_planner.policies.policy_file import load_policy_file
+from risk_dqn_planner.policies.supervised import Supervisor
+from risk_dqn_planner.risk.config import RiskConfig
+from risk_dqn_planner.safety.assumptions import SafetyAssumptions
+from risk_dqn_planner.safety.guard import Guard
+from risk_dqn_planner.state.history import StateEncoder
+from sim_bridge.environment.batch import BatchEnvironment
 from sim_bridge.environment.episodes import drive
+from sim_bridge.environment.interface import Outcome
 from sim_bridge.environment.place import Place, load_place
+from sim_bridge.environment.rewards import reward_named
 from sim_bridge.environment.seeds import VALIDATION_SEEDS, fixed_seeds
 from sim_bridge.learning.checkpoint import RunFolder
 from sim_bridge.learning.config import EvaluationConfig, LearnerConfig, ReplayConfig, TrainingConfig
-from sim_bridge.learning.export import initial_weights
+from sim_bridge.learning.export import initial_weights, network_of
+from sim_bridge.learning.learner import Learner
+from sim_bridge.learning.origin import origin_of
 from sim_bridge.learning.session import Run, Score, Session
 from sim_bridge.learning.train import main
 from sim_bridge.scenarios.loading import load_scenario
@@ -170,3 +181,84 @@ def test_command_names_what_it_cannot_use(capsys: pytest.CaptureFixture[str]) ->
     assert "there is no reward 'comfort'" in capsys.readouterr().err
     assert main(["--preset", "fast"]) == 2
     assert "there is no preset 'fast'" in capsys.readouterr().err
+
+
+def test_without_supervisor_and_memory_a_run_ends_as_it_did_before_there_were_any() -> None:
+    one = session()
+    list(one.run())
+    weights = one.last_weights
+    # Sums over all 35163 weights, as the revision before computed them.
+    assert float(weights.sum()) == pytest.approx(61.44294738769531, rel=1e-4)
+    assert float(np.abs(weights).sum()) == pytest.approx(1595.775390625, rel=1e-5)
+    assert TINY.description().keys() == {"config", "reward", "seed", "map_name", "scenario"}
+
+
+SUPERVISED = replace(TINY, supervisor="enforce", memory="tracked", reward="progress")
+
+
+def test_a_supervised_run_resumes_to_the_identical_result(tmp_path: Path) -> None:
+    whole, begun, resumed = (session(SUPERVISED) for _ in range(3))
+    list(whole.run())
+    next(begun.run())
+    RunFolder(tmp_path, SUPERVISED).save(begun)
+    assert RunFolder(tmp_path, SUPERVISED).resume(resumed)
+    list(resumed.run())
+    np.testing.assert_array_equal(resumed.last_weights, whole.last_weights)
+    assert resumed.records == whole.records
+    scores = [record.validation for record in whole.records if record.validation]
+    assert all(score.collision == 0.0 for score in scores)
+
+
+def test_the_vehicle_decides_as_training_under_the_supervisor_does() -> None:
+    weights = initial_weights(3)
+    weights[-1] += 1.0  # such as to prefer Fast by far, and be overruled often
+    learner = Learner(SUPERVISED.config.learner, weights)
+    vehicle = Supervisor(StopsAtGoal(LearnedPolicy(network_of(weights), "fast", "")))
+    simulation = place().simulation(load_scenario("dense_traffic"), 16)
+    environment = BatchEnvironment(
+        simulation, StateEncoder(), reward_named("progress"), RiskConfig(), 0, guard=Guard()
+    )
+    states, begun = environment.reset(), np.ones(16, dtype=np.bool_)
+    running, overruled = begun, 0
+    for _ in range(80):
+        values = learner.q_values(states)
+        trained = np.where(environment.sound, values, -np.inf).argmax(axis=1)
+        decisions = vehicle.decide(simulation.situations(), begun)
+        np.testing.assert_array_equal(decisions.action[running], trained[running])
+        overruled += int((values.argmax(axis=1) != trained).sum())
+        step = environment.step(trained)
+        states, begun, running = step.states, ~step.taken, step.outcome == Outcome.RUNNING
+    assert overruled > 100
+
+
+def test_a_supervised_policy_tells_what_it_was_trained_under(tmp_path: Path) -> None:
+    one = session(SUPERVISED)
+    list(one.run())
+    path = RunFolder(tmp_path, SUPERVISED).finish(one, "tiny")
+    run = load_policy_file(path).contract["training"]["run"]
+    assert run["supervisor"] == "enforce"
+    assert run["memory"] == "tracked"
+    assert run["assumptions"] == asdict(SafetyAssumptions())
+    origin = origin_of(path)
+    assert origin.company == [("supervisor", "enforce"), ("memory", "tracked")]
+    assert "SUPERVISOR=enforce MEMORY=tracked" in origin.command()
+
+
+def test_exported_supervised_policy_drives_as_validation_said(tmp_path: Path) -> None:
+    one = session(SUPERVISED)
+    list(one.run())
+    file = load_policy_file(RunFolder(tmp_path, SUPERVISED).finish(one, "tiny"))
+    policy = Supervisor(LearnedPolicy(file.module, file.name, file.sha256))
+    simulation = place().simulation(load_scenario("base"), 5, "tracked")
+    driven = drive(simulation, policy, fixed_seeds(VALIDATION_SEEDS, 5))
+    assert one.best is not None
+    assert Score.of([driven]) == one.best.score
+
+
+def test_only_a_supervisor_that_acts_is_of_use_in_training() -> None:
+    with pytest.raises(ConfigurationError, match=r"supervisor is 'report', .* off, enforce"):
+        replace(TINY, supervisor="report")
+    with pytest.raises(ConfigurationError, match="supervisor is 'on'"):
+        replace(TINY, supervisor="on")
+    with pytest.raises(ConfigurationError, match="memory is 'long'"):
+        replace(TINY, memory="long")

@@ -55,6 +55,25 @@ def test_waiting_forever_is_worth_the_geometric_sum() -> None:
     assert values(one)[0, :2] == pytest.approx(2.0, abs=0.05)
 
 
+def test_what_is_not_sound_is_never_taken_and_all_else_is_tried_alike() -> None:
+    walk = Walk(CONFIGURATION.environments, LENGTH, Outcome.SUCCESS, ruled_out=1)
+    config = replace(CONFIGURATION, exploration=ExplorationConfig(1.0, 1.0))
+    reports(Trainer(config, walk, learner(config), 0))
+    stop, slow, fast = walk.taken.tolist()
+    assert slow == 0
+    # Of 1200 or more draws with even chances, 5 standard deviations are 87.
+    assert abs(stop - fast) < 2 * 87
+
+
+def test_where_staying_is_not_sound_the_end_is_all_there_is() -> None:
+    walk = Walk(CONFIGURATION.environments, LENGTH, Outcome.SUCCESS, ruled_out=0)
+    one = Trainer(CONFIGURATION, walk, learner(CONFIGURATION), 0)
+    list(one.run())
+    # Slow stays too and pays for ever: 2, and one step before the end it is 2 as well.
+    assert values(one)[0, 1] == pytest.approx(2.0, abs=0.05)
+    assert walk.taken[0] == 0
+
+
 def test_same_seed_same_run_bit_for_bit() -> None:
     first, second, other = (trainer(CONFIGURATION, seed=seed) for seed in (0, 0, 1))
     for a, b in zip(reports(first), reports(second), strict=True):

@@ -42,22 +42,32 @@ def positions(which: NDArray[np.int64]) -> States:
 class Walk:
     """Positions 0 to `length`: FAST goes on, all else stays; the episode ends at the end.
 
-    Reward 1 a step. It ends as `outcome` says: SUCCESS terminates, TIMEOUT truncates.
+    Reward 1 a step. It ends as `outcome` says: SUCCESS terminates, TIMEOUT truncates. ruled_out:
+    an action that is never sound; `taken` counts what was done.
     """
 
     features = FEATURES
 
-    def __init__(self, batch: int, length: int, outcome: Outcome) -> None:
+    def __init__(
+        self, batch: int, length: int, outcome: Outcome, ruled_out: int | None = None
+    ) -> None:
         self.batch = batch
         self._length = length
         self._outcome = outcome
         self._position = np.zeros(batch, dtype=np.int64)
+        self._sound = np.arange(3) != ruled_out
+        self.taken = np.zeros(3, dtype=np.int64)
+
+    @property
+    def sound(self) -> NDArray[np.bool_]:
+        return np.tile(self._sound, (self.batch, 1))
 
     def reset(self) -> States:
         self._position[:] = 0
         return positions(self._position)
 
     def step(self, actions: NDArray[np.int64]) -> EnvironmentStep:
+        self.taken += np.bincount(actions, minlength=3)
         begin = self._position == self._length
         self._position = np.where(begin, 0, self._position + (actions == 2))
         ended = self._position == self._length

@@ -74,8 +74,8 @@ trainings: ## train all policies of the evaluation, one after another [SEEDS='0 
 	  $(SIMULATION)/train $(COLLISION_AWARE_PAPER) --seed $$seed || exit; \
 	  $(SIMULATION)/train $(TUNED) --seed $$seed || exit; done'
 
-evaluate: ## drive policies through the paper's cells [EPISODES POLICIES SCENARIOS MAP ROUTE ORIGIN REPORT]
-	@$(WITH_ROS) $(SIMULATION)/evaluate $(call option,--episodes,EPISODES) \
+evaluate: ## drive policies through all cells [SET=soundness EPISODES POLICIES SCENARIOS MAP ROUTE ORIGIN REPORT]
+	@$(WITH_ROS) $(SIMULATION)/evaluate $(call option,--set,SET) $(call option,--episodes,EPISODES) \
 	  $(call option,--policies,POLICIES) $(call option,--scenarios,SCENARIOS) \
 	  $(call option,--map,MAP) $(call option,--route,ROUTE) $(call option,--origin,ORIGIN) \
 	  $(call option,--report,REPORT) $(ARGS)

@@ -18,7 +18,7 @@ from sim_bridge.environment.seeds import TEST_SEEDS, fixed_seeds
 from sim_bridge.evaluation.cells import Cell, what_is_drawn
 from sim_bridge.evaluation.rollout import Clairvoyant, Contestant, joined, roll_out
 from sim_bridge.evaluation.store import Store, sources_fingerprint
-from sim_bridge.evaluation.summary import summarise
+from sim_bridge.evaluation.summary import summarise, summarise_first
 from sim_bridge.learning.checkpoint import git_revision
 from sim_bridge.scenarios.loading import Scenario
 
@@ -51,11 +51,15 @@ class Places:
 
 @dataclass(frozen=True)
 class Campaign:
-    """Where, on how many episodes of the test range, and where finished cells are kept."""
+    """Where, on how many episodes of the test range, and where finished cells are kept.
+
+    first: of how many of the first episodes to tell the outcomes one by one, `summarise_first`.
+    """
 
     places: Places
     episodes: int
     store: Store
+    first: int = 0
 
     def result(self, driver: Contestant, cell: Cell, advance: Advance) -> dict[str, Any]:
         """Return one line of results.json, driving the episodes unless they were driven before.
@@ -71,12 +75,14 @@ class Campaign:
             "policy": [driver.name, driver.hash],
             "scenario": what_is_drawn(scenario),
             "place": place_fingerprint(place),
+            "memory": cell.memory,
             "episodes": self.episodes,
+            "first": self.first,
             "sources": sources_fingerprint(),
         }
         figures = self.store.get(work)
         if figures is None:
-            figures = self._drive(driver, place, scenario, advance)
+            figures = self._drive(driver, place, cell, advance)
             self.store.put(work, figures)
         else:
             advance(self.episodes)
@@ -92,16 +98,18 @@ class Campaign:
         }
 
     def _drive(
-        self, driver: Contestant, place: Place, scenario: Scenario, advance: Advance
+        self, driver: Contestant, place: Place, cell: Cell, advance: Advance
     ) -> dict[str, Any]:
         seeds = fixed_seeds(TEST_SEEDS, self.episodes)
-        simulation = place.simulation(scenario, min(BATCH, self.episodes))
+        simulation = place.simulation(cell.load(), min(BATCH, self.episodes), cell.memory)
         parts = []
         for part in roll_out(simulation, driver, seeds):
             parts.append(part)
             advance(len(part.optimal))
         driven = joined(parts)
         figures = summarise(driven)
+        if self.first:
+            figures["first"] = summarise_first(driven, self.first)
         if isinstance(driver, Clairvoyant):
             figures["proven_share"] = round(float(np.mean(driven.optimal)), 6)
         return figures

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
+from risk_dqn_planner.situation.config import INSTANTANEOUS
 from sim_bridge.scenarios.loading import Scenario, load_scenario
 
 RESPAWNING, FINITE = "respawning", "finite"
@@ -21,11 +22,17 @@ RANGES_M = (40.0, 60.0, 90.0)
 
 @dataclass(frozen=True)
 class Cell:
-    """One distribution of episodes. scenario: name or file; sensor_range_m: None as it says."""
+    """One distribution of episodes, and how its ego perceives them.
+
+    scenario: name or file; sensor_range_m, sensor_forward_m: None as it says. memory: see
+    SituationConfig.
+    """
 
     scenario: str
     traffic: str
     sensor_range_m: float | None = None
+    sensor_forward_m: float | None = None
+    memory: str = INSTANTANEOUS
 
     def load(self) -> Scenario:
         """Return the scenario of this cell.
@@ -34,9 +41,12 @@ class Cell:
             ScenarioError: there is none of that name.
         """
         scenario = load_scenario(self.scenario)
+        sensor = scenario.sensor
         if self.sensor_range_m is not None:
-            sensor = replace(scenario.sensor, range_m=self.sensor_range_m)
-            scenario = replace(scenario, sensor=sensor)
+            sensor = replace(sensor, range_m=self.sensor_range_m)
+        if self.sensor_forward_m is not None:
+            sensor = replace(sensor, forward_offset_m=self.sensor_forward_m)
+        scenario = replace(scenario, sensor=sensor)
         respawn = self.traffic == RESPAWNING
         return replace(scenario, traffic=replace(scenario.traffic, respawn=respawn))
 

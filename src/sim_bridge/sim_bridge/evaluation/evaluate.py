@@ -13,14 +13,6 @@ from pathlib import Path
 from typing import Any
 
 from rich.console import Console
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    TextColumn,
-    TimeElapsedColumn,
-    TimeRemainingColumn,
-)
 from rich.table import Table
 
 from risk_dqn_planner.errors import ConfigurationError, PlannerError
@@ -31,27 +23,45 @@ from sim_bridge.environment.place import load_place
 from sim_bridge.evaluation.campaign import Campaign, Places, has_optimum, versions
 from sim_bridge.evaluation.cells import Cell, cells_of, paper_cells
 from sim_bridge.evaluation.contestants import DEFAULT_POLICIES, contestants, named_policies
+from sim_bridge.evaluation.progress import progress_on
 from sim_bridge.evaluation.rollout import Contestant
+from sim_bridge.evaluation.soundness.cells import MAPS, POLICIES
+from sim_bridge.evaluation.soundness.evaluate import EPISODES, LIMIT_EPISODES, Plan, run
 from sim_bridge.evaluation.store import Store, write_whole
 from sim_bridge.evaluation.training_runs import RUN_FOLDERS, named_runs, training_runs
 from sim_bridge.maps import map_names
 
 RESULTS = "results.json"
 INTERRUPTED = 130
+PAPER, SOUNDNESS = "paper", "soundness"
+SETS = (PAPER, SOUNDNESS)
+PAPER_EPISODES, PAPER_MAP = 2000, "four_way"
+_FOLDERS = {PAPER: Path("out/evaluation"), SOUNDNESS: Path("out/soundness")}
 
 
 def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="evaluate", description=__doc__)
     add = parser.add_argument
-    add("--episodes", type=int, default=2000, help="in each cell [%(default)s]")
+    add("--set", choices=SETS, default=PAPER, help="which cells [%(default)s]")
+    defaults = f"{PAPER_EPISODES}; {SOUNDNESS} {EPISODES}"
+    add("--episodes", type=int, help=f"in each cell [{defaults}]")
+    add(
+        "--limit-episodes",
+        type=int,
+        default=LIMIT_EPISODES,
+        help=f"of them, those whose limits are searched ({SOUNDNESS}) [%(default)s]",
+    )
     add(
         "--policies",
-        default=",".join(DEFAULT_POLICIES),
-        help="names, policy files (* allowed) or module:factory, by commas [%(default)s]",
+        help="names, policy files (* allowed) or module:factory, by commas "
+        f"[{','.join(DEFAULT_POLICIES)}; {SOUNDNESS} {','.join(POLICIES)}]",
     )
-    add("--scenarios", help="names or .yaml files instead of the paper's cells, by commas")
+    add("--scenarios", help="names or .yaml files instead of the set's cells, by commas")
     maps = ", ".join(map_names())
-    add("--map", default="four_way", help=f"own map ({maps}) or an .osm file [%(default)s]")
+    add(
+        "--map",
+        help=f"own map ({maps}) or an .osm file [{PAPER_MAP}; {SOUNDNESS} {','.join(MAPS)}]",
+    )
     add("--route", help="lanelet ids, separated by commas; own maps have one")
     add("--origin", help="latitude,longitude of the map's projection [deg]")
     add(
@@ -61,7 +71,7 @@ def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
         default=RUN_FOLDERS,
         help=f"folders of training runs [{' '.join(map(str, RUN_FOLDERS))}]",
     )
-    add("--output", type=Path, default=Path("out/evaluation"), help="folder [%(default)s]")
+    add("--output", type=Path, help="folder [out/evaluation; out/soundness]")
     add(
         "--report", type=Path, help="also write this page, its pictures to images/results beside it"
     )
@@ -71,7 +81,11 @@ def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
 def _places(arguments: argparse.Namespace) -> Places:
     route = None if arguments.route is None else parse_route(arguments.route)
     origin = MapOrigin.from_text(arguments.origin) if arguments.origin else None
-    return Places(lambda reach_m: load_place(arguments.map, route, origin, sensor_range_m=reach_m))
+    return Places(
+        lambda reach_m: load_place(
+            arguments.map or PAPER_MAP, route, origin, sensor_range_m=reach_m
+        )
+    )
 
 
 def _run(
@@ -82,14 +96,7 @@ def _run(
     results: list[dict[str, Any]],
 ) -> None:
     """Append the results of all drivers in all cells, showing how far it is."""
-    columns = (
-        TextColumn("{task.description:<52}"),
-        BarColumn(bar_width=24),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        TimeRemainingColumn(),
-    )
-    with Progress(*columns, console=console) as progress:
+    with progress_on(console) as progress:
         task = progress.add_task("", total=len(drivers) * len(cells) * campaign.episodes)
         for driver in drivers:
             reason = has_optimum(driver, campaign.places, cells[0])
@@ -135,29 +142,61 @@ def _overview(results: list[dict[str, Any]]) -> Table:
 def main(argv: Sequence[str] | None = None) -> int:
     """Evaluate as the command line says."""
     arguments = _arguments(argv)
+    if arguments.output is None:
+        arguments.output = _FOLDERS[arguments.set]
     console = Console()
-    results: list[dict[str, Any]] = []
     try:
-        if arguments.episodes < 1:
-            raise ConfigurationError(f"episodes is {arguments.episodes}, expected 1 or more")
-        drivers = contestants(named_policies(arguments.policies), arguments.training)
-        places = _places(arguments)
-        cells = cells_of(arguments.scenarios.split(",")) if arguments.scenarios else paper_cells()
-        for cell in cells:
-            cell.load()  # a wrong name is told before hours of work
-        campaign = Campaign(places, arguments.episodes, Store(arguments.output / "cells"))
-        _run(campaign, drivers, cells, console, results)
-        _write(arguments.output, versions(places.usual, drivers), results)
-        _draw(arguments, console)
+        if arguments.set == SOUNDNESS:
+            _soundness(arguments, console)
+        else:
+            _paper(arguments, console)
     except PlannerError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         console.print("interrupted; the same command goes on with the cell it was in")
         return INTERRUPTED
-    console.print(_overview(results))
     console.print(f"{arguments.output / RESULTS}")
     return 0
+
+
+def _paper(arguments: argparse.Namespace, console: Console) -> None:
+    episodes = PAPER_EPISODES if arguments.episodes is None else arguments.episodes
+    if episodes < 1:
+        raise ConfigurationError(f"episodes is {episodes}, expected 1 or more")
+    names = arguments.policies or ",".join(DEFAULT_POLICIES)
+    drivers = contestants(named_policies(names), arguments.training)
+    places = _places(arguments)
+    cells = cells_of(arguments.scenarios.split(",")) if arguments.scenarios else paper_cells()
+    for cell in cells:
+        cell.load()  # a wrong name is told before hours of work
+    results: list[dict[str, Any]] = []
+    campaign = Campaign(places, episodes, Store(arguments.output / "cells"))
+    _run(campaign, drivers, cells, console, results)
+    _write(arguments.output, versions(places.usual, drivers), results)
+    _draw(arguments, console)
+    console.print(_overview(results))
+
+
+def _soundness(arguments: argparse.Namespace, console: Console) -> None:
+    chosen = {
+        name: tuple(text.split(",")) if text else ()
+        for name, text in (
+            ("maps", arguments.map),
+            ("scenarios", arguments.scenarios),
+            ("policies", arguments.policies),
+        )
+    }
+    episodes = EPISODES if arguments.episodes is None else arguments.episodes
+    plan = Plan(arguments.output, episodes, arguments.limit_episodes, **chosen)
+    head, lines = run(plan, console)
+    _write(arguments.output, head, lines)
+    # Matplotlib takes a second to load, too long for --help.
+    from sim_bridge.evaluation.soundness.reporting.page import write_soundness  # noqa: PLC0415
+
+    content = json.loads((arguments.output / RESULTS).read_text(encoding="utf-8"))
+    for path in write_soundness(content, arguments.output, arguments.report):
+        console.print(f"{path}")
 
 
 def _draw(arguments: argparse.Namespace, console: Console) -> None:

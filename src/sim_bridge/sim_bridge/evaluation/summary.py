@@ -19,9 +19,9 @@ def summarise(driven: Driven) -> Figures:
 
     mean_speed_mps: distance over time of all episodes together, so that standing counts by how
     long it lasts; episode_speed_mps: mean of the episodes' own mean speeds. crossing_time_s: of
-    successful episodes. action_share, hard_brake_share: of decision steps; hard brakes take more
-    than 1 m/s off. min_time_gap_s: mean of the least gap of each episode that had one, `worst`
-    is the 5% quantile of these.
+    successful episodes. action_share, switch_share, hard_brake_share: of decision steps; hard
+    brakes take more than 1 m/s off. min_time_gap_s: mean of the least gap of each episode that
+    had one, `worst` is the 5% quantile of these.
     """
     _, outcome, counted = driven.episodes
     steps = counted.action_counts.sum(axis=1)
@@ -40,9 +40,21 @@ def summarise(driven: Driven) -> Figures:
             for action in Action
         },
         "switches_per_episode": _plain(mean_interval(counted.action_changes)),
+        "switch_share": _rate(counted.action_changes, steps),
         "hard_brake_share": _rate(counted.hard_brakes, steps),
         "min_time_gap_s": _time_gap(counted.least_time_gap_s),
     }
+
+
+def summarise_first(driven: Driven, count: int) -> Figures:
+    """Return what is needed to compare the first episodes one by one with those of others.
+
+    letters: how each of them ended, S, C or T. mean_speed_mps: as in `summarise`.
+    """
+    _, outcome, counted = driven.episodes
+    speed = ratio_interval(counted.progress_m[:count], counted.duration_s[:count])
+    letters = "".join(Outcome(o).name[0] for o in outcome[:count])
+    return {"letters": letters, "mean_speed_mps": _plain(speed)}
 
 
 def _share(happened: np.ndarray[Any, np.dtype[np.bool_]]) -> Figures:

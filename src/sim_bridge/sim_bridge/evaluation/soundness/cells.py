@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The set `soundness`: where no collision may happen, what accepted risk buys, what breaks it."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+from risk_dqn_planner.safety.assumptions import NO_CAP_MPS, SafetyAssumptions
+from risk_dqn_planner.situation.config import TRACKED
+from sim_bridge.evaluation.cells import BASE, FINITE, RESPAWNING, Cell
+from sim_bridge.scenarios.loading import load_scenario, scenario_names
+
+FASTEST_SOUND, LOOK_AHEAD, RULE_BASED = "fastest_sound", "look_ahead", "rule_based"
+TUNED, SUPERVISED = "tuned", "tuned+supervisor"
+POLICIES = (FASTEST_SOUND, LOOK_AHEAD, SUPERVISED, TUNED, RULE_BASED)
+# Those whose every action is sound where the assumptions hold.
+SOUND = (FASTEST_SOUND, LOOK_AHEAD, SUPERVISED)
+
+GOAL, MEMORY, FRONTIER, VIOLATED = "goal", "memory", "frontier", "violated"
+PARTS = (GOAL, MEMORY, FRONTIER, VIOLATED)
+MAPS = ("four_way", "t_junction", "multi_lane", "roundabout")
+OCCLUDED, CLOSE, NOISE = "severe_occlusion", "close_small_obstacle", "sensor_noise"
+SCENARIOS = (
+    BASE, "dense_traffic", "finite_dense", OCCLUDED, NOISE, "short_sensor_range", CLOSE,
+)  # fmt: skip
+# At the ego's centre, and at the front of a vehicle of 4 m.
+SENSORS_M = (0.0, 2.0)
+# Highest speeds ascribed to hidden vehicles; the last one is their lane's limit: no risk accepted.
+HIDDEN_TOP_MPS = (0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, NO_CAP_MPS)
+VIOLATIONS = (
+    "others_over_the_limit", "weak_brakes", "delay_200ms", "delay_500ms", "missed_detections",
+    "phantom_detections", "velocity_bias",
+)  # fmt: skip
+VIOLATED_ON = ("four_way", "roundabout")
+# Errors of perceived speeds have no bound; 1 of 16 000 lies outside of so many deviations.
+NOISE_DEVIATIONS = 4.0
+
+
+@dataclass(frozen=True)
+class SoundnessCell:
+    """A cell of one part of the set.
+
+    assumptions: of the sound policies in it, and of the sound limit. holds: whether the simulated
+    world keeps them. limits: whether both limits are searched.
+    """
+
+    part: str
+    map_name: str
+    cell: Cell
+    assumptions: SafetyAssumptions = field(default_factory=SafetyAssumptions)
+    policies: tuple[str, ...] = POLICIES
+    holds: bool = True
+    limits: bool = False
+
+
+def assumptions_for(cell: Cell) -> SafetyAssumptions:
+    """Return the default assumptions, with a bound on the errors that the sensor makes."""
+    noise_mps = cell.load().sensor.velocity_noise_mps
+    return SafetyAssumptions(speed_error_mps=NOISE_DEVIATIONS * noise_mps)
+
+
+def soundness_cells() -> list[SoundnessCell]:
+    """Return all cells whose scenarios there are."""
+    return [*_goal(), *_memory(), *_frontier(), *_violated()]
+
+
+def missing_scenarios() -> list[str]:
+    """Return the scenarios of the set that are not in this version."""
+    return sorted({*SCENARIOS, *VIOLATIONS} - set(scenario_names()))
+
+
+def _traffic(scenario: str) -> str:
+    return RESPAWNING if load_scenario(scenario).traffic.respawn else FINITE
+
+
+def _goal() -> Iterator[SoundnessCell]:
+    for map_name in MAPS:
+        for scenario in SCENARIOS:
+            for forward_m in SENSORS_M:
+                cell = Cell(scenario, _traffic(scenario), sensor_forward_m=forward_m)
+                yield SoundnessCell(GOAL, map_name, cell, assumptions_for(cell), limits=True)
+
+
+def _memory() -> Iterator[SoundnessCell]:
+    """Where something stands close, and the ego has seen behind it before."""
+    policies = (FASTEST_SOUND, LOOK_AHEAD)
+    for map_name in MAPS:
+        for scenario in (CLOSE, OCCLUDED):
+            for forward_m in SENSORS_M:
+                cell = Cell(
+                    scenario, _traffic(scenario), sensor_forward_m=forward_m, memory=TRACKED
+                )
+                yield SoundnessCell(MEMORY, map_name, cell, policies=policies, limits=True)
+
+
+def _frontier() -> Iterator[SoundnessCell]:
+    """Where the worst case forbids most; a hidden vehicle that is slower than the truth is risk."""
+    cell = Cell(OCCLUDED, RESPAWNING, sensor_forward_m=0.0)
+    for top_mps in HIDDEN_TOP_MPS:
+        assumptions = SafetyAssumptions(hidden_top_speed_mps=top_mps)
+        holds = top_mps == NO_CAP_MPS
+        policies = (FASTEST_SOUND, SUPERVISED)
+        yield SoundnessCell(FRONTIER, MAPS[0], cell, assumptions, policies, holds, limits=holds)
+
+
+def _violated() -> Iterator[SoundnessCell]:
+    """Worlds that break one assumption each, and base, which keeps them all."""
+    for map_name in VIOLATED_ON:
+        for scenario in (BASE, *(each for each in VIOLATIONS if each in scenario_names())):
+            cell = Cell(scenario, _traffic(scenario), sensor_forward_m=0.0)
+            yield SoundnessCell(VIOLATED, map_name, cell, holds=scenario == BASE)

@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The page and the pictures of the set `soundness`."""

@@ -1,0 +1,180 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Tables of the set `soundness`, from the lines of its results.json."""
+
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any
+
+from risk_dqn_planner.safety.assumptions import NO_CAP_MPS
+from sim_bridge.evaluation.clairvoyant import NAME as CLAIRVOYANT
+from sim_bridge.evaluation.reporting.markdown import NOTHING, OUTCOMES, table
+from sim_bridge.evaluation.soundness.limits import SOUND_LIMIT
+
+Line = dict[str, Any]
+LIMITS = (CLAIRVOYANT, SOUND_LIMIT)
+# What the project asks of a sound policy, relative to the sound limit.
+SUCCESS_WANTED, SPEED_WANTED = 0.97, 0.95
+
+
+def part_of(lines: Iterable[Line], part: str) -> list[Line]:
+    """Return the lines of one part of the set."""
+    return [line for line in lines if line["part"] == part]
+
+
+def policies_of(lines: Iterable[Line]) -> list[str]:
+    """Return the policies, limits left out, in their order of appearance."""
+    names = dict.fromkeys(line["policy"] for line in lines)
+    return [name for name in names if name not in LIMITS]
+
+
+def is_alarming(line: Line) -> bool:
+    """Tell whether something collided that cannot."""
+    promised = line["sound"] and line["assumptions_hold"]
+    return bool(promised and line["collision"]["rate"] > 0.0)
+
+
+def count(line: Line) -> int:
+    """Return the number of collisions."""
+    return round(float(line["collision"]["rate"]) * int(line["episodes"]))
+
+
+def per_cent(share: Line | None) -> str:
+    """Return a share in percent, with as many digits as tell it from 0 or 100."""
+    if share is None:
+        return NOTHING
+    return f"{100 * share['rate']:.1f}"
+
+
+def with_interval(value: Line | None, factor: float = 1.0, digits: int = 1) -> str:
+    """Return a share or mean with its interval."""
+    if value is None:
+        return NOTHING
+    center = value["rate"] if "rate" in value else value["mean"]
+    low, high = factor * value["low"], factor * value["high"]
+    return f"{factor * center:.{digits}f} [{low:.{digits}f}, {high:.{digits}f}]"
+
+
+def outcome(line: Line | None) -> str:
+    """Return success / collision / timeout in percent; a broken promise stands out."""
+    if line is None:
+        return NOTHING
+    success, collision, timeout = (per_cent(line[key]) for key in OUTCOMES)
+    if is_alarming(line):
+        collision = f"🔴 **{count(line)} collisions**"
+    return f"{success} / {collision} / {timeout}"
+
+
+def where(line: Line) -> str:
+    """Return what a row of the set's tables is called."""
+    place = "centre" if line["sensor_forward_m"] == 0.0 else "front"
+    return f"{line['scenario'].replace('_', ' ')}, {place}"
+
+
+def top_speed(line: Line) -> str:
+    """Return the highest speed ascribed to hidden vehicles."""
+    mps = line["hidden_top_speed_mps"]
+    return "the limit (sound)" if mps == NO_CAP_MPS else f"{mps:g}"
+
+
+def by_map(
+    lines: Sequence[Line], policy: str, show: Callable[[Line | None], str], title: str
+) -> str:
+    """Return a table of one policy: a row for each scenario and sensor, a column for each map."""
+    own = [line for line in lines if line["policy"] == policy]
+    maps = list(dict.fromkeys(line["map"] for line in own))
+    rows = []
+    for name in dict.fromkeys(where(line) for line in own):
+        found = {line["map"]: line for line in own if where(line) == name}
+        rows.append([name, *(show(found.get(each)) for each in maps)])
+    return table([title, *maps], rows)
+
+
+def limits_of(line: Line | None) -> str:
+    """Return success of both limits in percent, and their mean speeds are elsewhere."""
+    if line is None:
+        return NOTHING
+    limits = line["limits"]
+    return f"{per_cent(limits['clairvoyant'])} / {per_cent(limits['sound_limit'])}"
+
+
+def reached(lines: Sequence[Line]) -> Callable[[Line | None], str]:
+    """Return what shows success and speed of a line relative to the sound limit of its cell."""
+    limits = {(line["map"], where(line)): line for line in lines if line["policy"] == SOUND_LIMIT}
+
+    def show(line: Line | None) -> str:
+        limit = None if line is None else limits.get((line["map"], where(line)))
+        if line is None or limit is None or limit["limits"]["sound_limit"]["rate"] <= 0.0:
+            return NOTHING
+        success = line["limits"]["success"]["rate"] / limit["limits"]["sound_limit"]["rate"]
+        speed = line["limits"]["mean_speed_mps"]["mean"] / limit["mean_speed_mps"]["mean"]
+        return " / ".join(
+            f"{100 * value:.0f}" if value >= wanted else f"*{100 * value:.0f}*"
+            for value, wanted in ((success, SUCCESS_WANTED), (speed, SPEED_WANTED))
+        )
+
+    return show
+
+
+def timeouts(lines: Sequence[Line]) -> str:
+    """Return why each policy timed out, over all cells whose limits are known."""
+    rows = []
+    for policy in policies_of(lines):
+        own = [line["timeouts"] for line in lines if line["policy"] == policy]
+        sums = [sum(each[key] for each in own) for key in ("episodes", *_CAUSES)]
+        rows.append([policy, *(str(number) for number in sums)])
+    return table(["policy", "episodes", "impossible", "price of soundness", "missed"], rows)
+
+
+_CAUSES = ("impossible", "price", "missed")
+
+
+def smoothness(lines: Sequence[Line]) -> str:
+    """Return how smoothly the policies drive."""
+    rows = [
+        [
+            line["policy"],
+            line["map"],
+            with_interval(line["switch_share"], 100.0),
+            with_interval(line["hard_brake_share"], 100.0),
+            with_interval(line["mean_speed_mps"], 1.0, 2),
+        ]
+        for line in lines
+    ]
+    header = ["policy", "map", "decisions that change, %", "hard brakes, %", "mean speed, m/s"]
+    return table(header, rows)
+
+
+def collisions_in_all(lines: Sequence[Line]) -> str:
+    """Return collisions over all cells whose assumptions hold, and the cells that had any."""
+    rows = []
+    for policy in policies_of(lines):
+        own = [line for line in lines if line["policy"] == policy and line["assumptions_hold"]]
+        hits = sum(count(line) for line in own)
+        worst = max(own, key=lambda line: float(line["collision"]["rate"]))
+        total = sum(line["episodes"] for line in own)
+        alarm = any(is_alarming(line) for line in own)
+        shown = f"🔴 **{hits}**" if alarm else str(hits)
+        highest = f"{100 * worst['collision']['high']:.3f}%"
+        rows.append([policy, str(len(own)), str(total), shown, highest])
+    header = ["policy", "cells", "episodes", "collisions", "the worst cell's interval ends at"]
+    return table(header, rows)
+
+
+def full(lines: Sequence[Line], first: Callable[[Line], str], title: str) -> str:
+    """Return lines with the intervals of what matters, `first` saying what each is."""
+    rows = [
+        [
+            first(line),
+            line["policy"],
+            with_interval(line["success"], 100.0),
+            (f"🔴 **{count(line)}**: " if is_alarming(line) else "")
+            + with_interval(line["collision"], 100.0, 3),
+            with_interval(line["mean_speed_mps"], 1.0, 2),
+            with_interval(line["crossing_time_s"], 1.0, 1),
+            str(line["episodes"]),
+        ]
+        for line in lines
+    ]
+    header = [
+        title, "policy", "success, %", "collision, %", "speed, m/s", "crossing, s", "episodes",
+    ]  # fmt: skip
+    return table(header, rows)

@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: Apache-2.0
+import itertools
+
+from risk_dqn_planner.safety.assumptions import NO_CAP_MPS, SafetyAssumptions
+from risk_dqn_planner.situation.config import INSTANTANEOUS, TRACKED
+from sim_bridge.evaluation.cells import FINITE, RESPAWNING
+from sim_bridge.evaluation.soundness.cells import (
+    FRONTIER,
+    GOAL,
+    MAPS,
+    MEMORY,
+    SCENARIOS,
+    VIOLATED,
+    soundness_cells,
+)
+from sim_bridge.evaluation.soundness.drivers import Drivers, is_sound
+from sim_bridge.maps import map_names
+
+
+def test_the_goal_is_judged_in_every_scenario_on_every_map_with_both_sensors() -> None:
+    goal = [each for each in soundness_cells() if each.part == GOAL]
+    found = {(e.map_name, e.cell.scenario, e.cell.sensor_forward_m) for e in goal}
+    assert found == set(itertools.product(MAPS, SCENARIOS, (0.0, 2.0)))
+    assert len(goal) == len(found) == 7 * 4 * 2
+    assert set(MAPS) == set(map_names())
+    assert all(each.holds and each.limits for each in goal)
+    assert {each.cell.memory for each in goal} == {INSTANTANEOUS}
+
+
+def test_sensor_and_traffic_are_as_the_cell_says() -> None:
+    for each in soundness_cells():
+        scenario = each.cell.load()
+        assert scenario.sensor.forward_offset_m == each.cell.sensor_forward_m
+        finite = each.cell.scenario == "finite_dense"
+        assert each.cell.traffic == (FINITE if finite else RESPAWNING)
+        assert scenario.traffic.respawn is not finite
+
+
+def test_only_where_speeds_are_noisy_the_check_allows_for_errors() -> None:
+    for each in soundness_cells():
+        noisy = each.cell.scenario == "sensor_noise"
+        # 4 deviations of 1 m/s.
+        assert each.assumptions.speed_error_mps == (4.0 if noisy else 0.0)
+
+
+def test_accepted_risk_goes_from_standing_ghosts_up_to_none() -> None:
+    frontier = [each for each in soundness_cells() if each.part == FRONTIER]
+    caps = [each.assumptions.hidden_top_speed_mps for each in frontier]
+    assert caps == [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, NO_CAP_MPS]
+    assert [each.holds for each in frontier] == [False] * 7 + [True]
+
+
+def test_memory_is_tried_where_something_stands_close() -> None:
+    memory = [each for each in soundness_cells() if each.part == MEMORY]
+    assert {each.cell.scenario for each in memory} == {"close_small_obstacle", "severe_occlusion"}
+    assert {each.cell.memory for each in memory} == {TRACKED}
+
+
+def test_a_broken_assumption_is_never_held_against_a_policy() -> None:
+    broken = [each for each in soundness_cells() if each.part == VIOLATED]
+    assert [each.cell.scenario for each in broken if each.holds] == ["base", "base"]
+
+
+def test_contestants_take_over_the_cell_s_assumptions() -> None:
+    drivers, careful = Drivers(), SafetyAssumptions(speed_error_mps=4.0)
+    for name in ("fastest_sound", "rule_based+supervisor"):
+        assert is_sound(name)
+        usual, other = drivers.of(name, SafetyAssumptions()), drivers.of(name, careful)
+        assert usual.name == other.name == name
+        assert usual.hash != other.hash
+    assert not is_sound("rule_based")
+    hashes = {drivers.of("rule_based", each).hash for each in (SafetyAssumptions(), careful)}
+    assert len(hashes) == 1

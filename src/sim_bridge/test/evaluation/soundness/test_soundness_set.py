@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: Apache-2.0
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from sim_bridge.evaluation import campaign, evaluate
+from sim_bridge.evaluation.soundness.beam import BeamConfig
+from sim_bridge.evaluation.soundness.reporting.tables import outcome
+
+OPTIONS = [
+    "--set", "soundness", "--episodes", "6", "--limit-episodes", "2", "--map", "four_way",
+    "--scenarios", "severe_occlusion", "--policies", "fastest_sound,rule_based",
+]  # fmt: skip
+
+
+def run(folder: Path, *more: str) -> dict[str, Any]:
+    assert evaluate.main([*OPTIONS, "--output", str(folder), *more]) == 0
+    content: dict[str, Any] = json.loads((folder / "results.json").read_text())
+    return content
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A finished run with its page."""
+    path = tmp_path_factory.mktemp("soundness")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(BeamConfig, "__init__", _narrow)
+        run(path, "--report", str(path / "page.md"))
+    return path
+
+
+def _narrow(self: BeamConfig) -> None:
+    for name, value in (("width", 8), ("cell_m", 0.5), ("cell_mps", 0.5)):
+        object.__setattr__(self, name, value)
+
+
+def test_lines_hold_limits_and_causes_beside_the_usual_figures(folder: Path) -> None:
+    lines = json.loads((folder / "results.json").read_text())["cells"]
+    goal = [line for line in lines if line["part"] == "goal"]
+    names = ["clairvoyant", "sound_limit", "fastest_sound", "rule_based"]
+    assert [line["policy"] for line in goal] == names * 2
+    for line in goal:
+        assert line["episodes"] == (2 if line["policy"] in names[:2] else 6)
+        assert line["limits"]["episodes"] == line["timeouts"]["episodes"] == 2
+        reached, sound = line["limits"]["clairvoyant"], line["limits"]["sound_limit"]
+        assert reached["rate"] >= sound["rate"]
+        causes = sum(line["timeouts"][key] for key in ("impossible", "price", "missed"))
+        assert causes <= 2
+        assert {"success", "mean_speed_mps", "switch_share", "hard_brake_share"} <= line.keys()
+    frontier = [line for line in lines if line["part"] == "frontier"]
+    assert [line["policy"] for line in frontier].count("fastest_sound") == 8
+
+
+def test_the_page_shows_every_part_that_was_driven(folder: Path) -> None:
+    page = (folder / "page.md").read_text()
+    for title in ("Collisions", "What is possible", "With memory", "Accepted risk"):
+        assert f"## {title}" in page
+    assert (folder / "images" / "soundness" / "accepted_risk.png").stat().st_size > 0
+
+
+def test_a_second_run_drives_nothing_again(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object) -> None:
+        raise AssertionError("this cell was driven before")
+
+    expected = json.loads((folder / "results.json").read_text())
+    monkeypatch.setattr(campaign, "roll_out", refuse)
+    monkeypatch.setattr(BeamConfig, "__init__", _narrow)
+    assert run(folder) == expected
+
+
+def test_a_broken_promise_stands_out() -> None:
+    shares = {"success": {"rate": 0.5}, "collision": {"rate": 0.5}, "timeout": {"rate": 0.0}}
+    line = {**shares, "episodes": 4, "sound": True, "assumptions_hold": True}
+    assert outcome(line) == "50.0 / 🔴 **2 collisions** / 0.0"
+    assert outcome({**line, "sound": False}) == "50.0 / 50.0 / 0.0"
+
+
+def test_a_choice_that_leaves_nothing_is_said(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    more = ["--output", str(tmp_path), "--scenarios", "nowhere"]
+    assert evaluate.main(["--set", "soundness", *more]) == 2
+    assert "no cell of the set is left" in capsys.readouterr().err

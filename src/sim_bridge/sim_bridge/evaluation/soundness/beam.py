@@ -49,7 +49,7 @@ _PLACE_M, _SPEED_MPS = 1.0, 1.25
 class BeamConfig:
     """How much is followed. cell_m, cell_mps: what counts as the same place and speed."""
 
-    width: int = 128
+    width: int = 64
     cell_m: float = 0.1
     cell_mps: float = 0.05
 

@@ -151,6 +151,7 @@ class BatchEnvironment:
         """Return everything that `load_state_dict` needs to go on identically."""
         return {
             "simulation": copy.deepcopy(self._simulation.state),
+            "lags": copy.deepcopy(self._simulation.lags),
             "hidden_space": copy.deepcopy(self._simulation.hidden_space),
             "encoder": copy.deepcopy(self._encoder),
             "begun": self._begun.copy(),
@@ -161,7 +162,8 @@ class BatchEnvironment:
     def load_state_dict(self, state: dict[str, Any]) -> None:
         """Take over an interrupted run of the same scenario, map and batch."""
         self._simulation.state = copy.deepcopy(state["simulation"])
-        # Runs from before there was a memory have none.
+        # Runs from before there was a memory, or a lag, have none.
+        self._simulation.lags = copy.deepcopy(state.get("lags", self._simulation.lags))
         self._simulation.hidden_space = copy.deepcopy(state.get("hidden_space"))
         self._encoder = copy.deepcopy(state["encoder"])
         self._begun[:] = state["begun"]

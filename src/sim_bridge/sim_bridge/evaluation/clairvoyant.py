@@ -54,13 +54,22 @@ class Optima(NamedTuple):
 
 
 def require_indifferent(simulation: Simulation) -> None:
-    """Refuse scenarios whose traffic reacts to the ego.
+    """Refuse scenarios whose traffic reacts to the ego, and those whose ego is delayed.
 
     Raises:
-        ScenarioError: a lane merges, where followers make room, or a share of vehicles yields.
+        ScenarioError: a lane merges, where followers make room; vehicles yield to the ego or
+            brake for it; or the ego's actions take effect later, which the search does not know.
     """
-    if simulation.scenario.traffic.yielding_share > 0.0:
-        reason = f"in scenario {simulation.scenario.name} vehicles yield to the ego"
+    scenario = simulation.scenario
+    if scenario.ego.actuation_delay_s > 0.0:
+        raise ScenarioError(
+            f"in scenario {scenario.name} actions take effect {scenario.ego.actuation_delay_s} s "
+            "later, expected at once: no optimum is computed"
+        )
+    if scenario.traffic.yielding_share > 0.0:
+        reason = f"in scenario {scenario.name} vehicles yield to the ego"
+    elif scenario.traffic.brakes_for_ego_after_s is not None:
+        reason = f"in scenario {scenario.name} vehicles brake for the ego"
     elif simulation.world.lanes.merging.any():
         lane = simulation.world.lanes.id[simulation.world.lanes.merging][0]
         reason = f"on merging lane {lane} vehicles follow the ego"

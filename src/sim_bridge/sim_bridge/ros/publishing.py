@@ -7,7 +7,7 @@ from rclpy.node import Node
 
 from risk_dqn_planner.ros import conversions
 from risk_dqn_planner.situation.inputs import EgoPose, ObjectArrays
-from sim_bridge.perception.perception import VehiclePoses
+from sim_bridge.perception.poses import VehiclePoses
 from sim_bridge.ros import topics
 from sim_bridge.ros.transform import TransformPublisher
 from sim_bridge.simulation.simulation import Simulation, StepResult
@@ -16,16 +16,18 @@ EGO_ID = 0
 _NODE = "simulator"
 
 
-def perceived(poses: VehiclePoses, length_m: float, width_m: float) -> ObjectArrays:
+def perceived(
+    poses: VehiclePoses, phantoms: VehiclePoses, length_m: float, width_m: float
+) -> ObjectArrays:
     """Return what the sensor reports of the first episode: hidden vehicles are absent."""
-    seen = poses.mask[0] & ~poses.hidden[0]
-    count = int(seen.sum())
+    groups = [(group, group.mask[0] & ~group.hidden[0]) for group in (poses, phantoms)]
+    count = sum(int(seen.sum()) for _, seen in groups)
     return ObjectArrays(
-        poses.id[0, seen],
-        poses.x_m[0, seen],
-        poses.y_m[0, seen],
-        poses.heading_rad[0, seen],
-        poses.measured_speed_mps[0, seen],
+        np.concatenate([group.id[0, seen] for group, seen in groups]),
+        np.concatenate([group.x_m[0, seen] for group, seen in groups]),
+        np.concatenate([group.y_m[0, seen] for group, seen in groups]),
+        np.concatenate([group.heading_rad[0, seen] for group, seen in groups]),
+        np.concatenate([group.measured_speed_mps[0, seen] for group, seen in groups]),
         np.full(count, length_m),
         np.full(count, width_m),
     )
@@ -90,7 +92,7 @@ class FramePublisher:
         ego = EgoPose(*simulation.ego_poses()[0].tolist())
         poses = simulation.vehicle_poses()
         size = simulation.model.traffic_dimensions
-        seen = perceived(poses, size.length_m, size.width_m)
+        seen = perceived(poses, simulation.phantom_poses(), size.length_m, size.width_m)
         area = simulation.visible_area()
         truth = ground_truth(simulation, ego, poses, seed, stamp_ns, self._frame)
         odometry = conversions.ego_to_message(ego, stamp_ns, self._frame)

@@ -2,14 +2,14 @@
 """Scenarios are files: those of the package, and any folder or file of the user's own.
 
 A file `name.yaml` holds `description` and any fields of `Scenario`, grouped as there; an
-interval is written [low, high]. `extends: other` takes all else from another scenario, which
-is looked for in the same folder, then in the package.
+interval is written [low, high], never `null` where a field allows it. `extends: other` takes all
+else from another scenario, which is looked for in the same folder, then in the package.
 """
 
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from pathlib import Path
-from typing import Any, get_type_hints
+from typing import Any, get_args, get_type_hints
 
 import yaml
 
@@ -91,12 +91,21 @@ def _build(kind: Any, content: Mapping[str, Any], path: Path, where: str) -> Any
             + ", ".join(sorted(known))
         )
     values = {
-        name: _convert(types[name], value, path, where + name) for name, value in content.items()
+        name: _convert_or_none(types[name], value, path, where + name)
+        for name, value in content.items()
     }
     try:
         return kind(**values)
     except ScenarioError as err:
         raise ScenarioError(f"{path}: {err}") from err
+
+
+def _convert_or_none(kind: Any, value: Any, path: Path, where: str) -> Any:  # noqa: ANN401 (any field)
+    """Convert a value of a file to the type of its field, which may allow None."""
+    allowed = get_args(kind)
+    if type(None) not in allowed:
+        return _convert(kind, value, path, where)
+    return None if value is None else _convert(allowed[0], value, path, where)
 
 
 def _convert(kind: Any, value: Any, path: Path, where: str) -> Any:  # noqa: ANN401 (any field)

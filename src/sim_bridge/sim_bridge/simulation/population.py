@@ -158,7 +158,8 @@ def replace_those_gone(
             p, desired, yields[b, i] = draw_vehicle(
                 seed[b], next_id[b], draws, first_entry, entry_path
             )
-            path[b, i], desired_mps[b, i] = p, min(desired, limit_mps[p])
+            path[b, i] = p
+            desired_mps[b, i] = draws.overspeed_factor * min(desired, limit_mps[p])
             ids[b, i], follows_ego[b, i] = next_id[b], False
             next_id[b] += 1
 

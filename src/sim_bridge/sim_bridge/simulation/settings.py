@@ -5,7 +5,11 @@ import math
 from typing import NamedTuple
 
 from risk_dqn_planner.vehicle import EgoLimits
-from sim_bridge.scenarios.fields import CarFollowing, Scenario
+from sim_bridge.scenarios.fields import CarFollowing, Scenario, Traffic
+
+NEVER = -1
+# A vehicle that does not exist is reported for so long, then perhaps another one.
+PHANTOM_LASTS_S = 1.0
 
 
 class Idm(NamedTuple):
@@ -20,7 +24,7 @@ class Idm(NamedTuple):
 
 
 class EgoDrive(NamedTuple):
-    """`EgoLimits` for kernels."""
+    """`EgoLimits` for kernels, as the ego really drives: see `EgoStart.braking_factor`."""
 
     acceleration_mps2: float
     braking_mps2: float
@@ -36,23 +40,46 @@ class Draws(NamedTuple):
     vehicles: tuple[int, int]
     start_distance_m: tuple[float, float]
     desired_speed_mps: tuple[float, float]
+    overspeed_factor: float
     headway_s: float
     respawn: bool
     yielding_share: float
 
 
+class Reaction(NamedTuple):
+    """How others brake for the ego: how many inner steps after they see it, -1 for never."""
+
+    after_steps: int
+    braking_mps2: float
+
+
+class Sensing(NamedTuple):
+    """How the sensor errs, see `Sensor`; a phantom lasts `phantom_steps` inner steps."""
+
+    noise_mps: float
+    bias_mps: float
+    missed_share: float
+    phantom_share: float
+    phantom_steps: int
+
+
 class Settings(NamedTuple):
-    """All numbers that kernels read; steps are inner steps."""
+    """All numbers that kernels read; steps are inner steps.
+
+    delay_steps: how much later a decision takes effect.
+    """
 
     step_s: float
     decision_steps: int
     limit_steps: int
+    delay_steps: int
     ego: EgoDrive
     idm: Idm
     draws: Draws
+    reaction: Reaction
     sensor_range_m: float
     sensor_offset_m: float
-    velocity_noise_mps: float
+    sensing: Sensing
 
 
 def settings_of(scenario: Scenario, limits: EgoLimits) -> Settings:
@@ -65,6 +92,7 @@ def settings_of(scenario: Scenario, limits: EgoLimits) -> Settings:
         vehicles=(int(traffic.vehicles.low), int(traffic.vehicles.high)),
         start_distance_m=(traffic.start_distance_m.low, traffic.start_distance_m.high),
         desired_speed_mps=(traffic.desired_speed_mps.low, traffic.desired_speed_mps.high),
+        overspeed_factor=traffic.overspeed_factor,
         headway_s=traffic.headway_s,
         respawn=traffic.respawn,
         yielding_share=traffic.yielding_share,
@@ -73,15 +101,33 @@ def settings_of(scenario: Scenario, limits: EgoLimits) -> Settings:
         step_s=timing.inner_step_s,
         decision_steps=timing.inner_steps,
         limit_steps=timing.limit_steps,
+        delay_steps=round(scenario.ego.actuation_delay_s / timing.inner_step_s),
         ego=EgoDrive(
-            limits.acceleration_mps2, limits.braking_mps2, limits.slow_mps, limits.fast_mps
+            acceleration_mps2=limits.acceleration_mps2,
+            braking_mps2=limits.braking_mps2 * scenario.ego.braking_factor,
+            slow_mps=limits.slow_mps,
+            fast_mps=limits.fast_mps,
         ),
         idm=idm_of(traffic.car_following),
         draws=draws,
+        reaction=reaction_of(traffic, timing.inner_step_s),
         sensor_range_m=sensor.range_m,
         sensor_offset_m=sensor.forward_offset_m,
-        velocity_noise_mps=sensor.velocity_noise_mps,
+        sensing=Sensing(
+            noise_mps=sensor.velocity_noise_mps,
+            bias_mps=sensor.velocity_bias_mps,
+            missed_share=sensor.missed_share,
+            phantom_share=sensor.phantom_share,
+            phantom_steps=max(round(PHANTOM_LASTS_S / timing.inner_step_s), 1),
+        ),
     )
+
+
+def reaction_of(traffic: Traffic, step_s: float) -> Reaction:
+    """Flatten how others brake for the ego."""
+    after_s = traffic.brakes_for_ego_after_s
+    after_steps = NEVER if after_s is None else round(after_s / step_s)
+    return Reaction(after_steps, traffic.brakes_for_ego_mps2)
 
 
 def idm_of(config: CarFollowing) -> Idm:

@@ -26,10 +26,13 @@ from risk_dqn_planner.situation.situations import (
     empty_situations,
 )
 from risk_dqn_planner.vehicle import EgoLimits
-from sim_bridge.perception.perception import VehiclePoses, empty_view, perceive, reveal
+from sim_bridge.perception.perception import empty_view, perceive
+from sim_bridge.perception.phantoms import empty_reported
+from sim_bridge.perception.poses import VehiclePoses, empty_poses, reveal, reveal_phantoms
 from sim_bridge.perception.tracking import Tracker
 from sim_bridge.perception.visible_area import visible_polygon
 from sim_bridge.scenarios.fields import Scenario
+from sim_bridge.simulation.lags import empty_lags, forget_lags
 from sim_bridge.simulation.settings import settings_of
 from sim_bridge.simulation.starting import start_episodes
 from sim_bridge.simulation.state import NOBODY, empty_state
@@ -76,8 +79,8 @@ class Simulation:
     """B episodes of one scenario at one intersection.
 
     Public for reading: `model`, `scenario`, `batch`, `world`, `settings`, `state` (see
-    SimulationState) and `tracker`, the planner's memory, None without one. The same seed gives
-    the same episode in any batch. What goes on is in `state` and `hidden_space`.
+    SimulationState), `lags` and `tracker`, the planner's memory, None without one. The same seed
+    gives the same episode in any batch. What goes on is in `state`, `lags` and `hidden_space`.
     """
 
     def __init__(
@@ -110,14 +113,16 @@ class Simulation:
         vehicles = int(scenario.traffic.vehicles.high)
         obstacles = 2 * scenario.obstacles.per_side
         self.state = empty_state(batch, vehicles, obstacles, len(model.lanes))
+        self.lags = empty_lags(batch, vehicles, self.settings)
         self._view = empty_view(batch, vehicles, obstacles)
-        self._pairs = max(vehicles * most_lanes_at_once(self.world.matches), 1)
-        self._instantaneous_lanes = self.world.lanes
+        phantoms = len(model.lanes) if scenario.sensor.phantom_share > 0.0 else 0
+        self._reported = empty_reported(batch, vehicles, phantoms)
+        self._pairs = max((vehicles + phantoms) * most_lanes_at_once(self.world.matches), 1)
+        self._looked_along = self.world.lanes.first_path
         self.tracker: Tracker | None = None
         if memory == TRACKED:
             # The memory says how far every lane is free, so nobody else need look along them.
-            nothing = np.zeros(1, dtype=np.int64)
-            self._instantaneous_lanes = self.world.lanes._replace(first_path=nothing)
+            self._looked_along = np.zeros(1, dtype=np.int64)
             config = tracking or TrackingConfig()
             self.tracker = Tracker(self.world, config, scenario.sensor.range_m, batch, self._pairs)
 
@@ -158,6 +163,7 @@ class Simulation:
             np.ascontiguousarray(given.astype(np.uint64)),
             np.ascontiguousarray(chosen.astype(np.bool_)),
         )
+        forget_lags(self.lags, chosen.astype(np.bool_))
         if self.tracker is not None:
             self.tracker.forget(chosen.astype(np.bool_))
 
@@ -195,6 +201,7 @@ class Simulation:
             self.settings,
             self.state,
             given,
+            self.lags,
             self._view.shadows,
             steps,
         )
@@ -217,8 +224,9 @@ class Simulation:
         world = self.world
         perceive(
             world.ego,
-            world.paths.table,
-            self._instantaneous_lanes,
+            world.paths,
+            world.lanes,
+            self._looked_along,
             world.matches,
             world.sight,
             world.obstacles.corners,
@@ -226,6 +234,7 @@ class Simulation:
             episodes,
             vehicles,
             self._view,
+            self._reported,
             result,
         )
         if self.tracker is not None:
@@ -267,17 +276,10 @@ class Simulation:
     def vehicle_poses(self) -> VehiclePoses:
         """Return the truth about all vehicles, seen or hidden."""
         episodes, vehicles, _ = self.state
-        shape = vehicles.driving.shape
-        poses = VehiclePoses(
-            mask=vehicles.driving.copy(),
-            id=vehicles.id.copy(),
-            x_m=np.zeros(shape),
-            y_m=np.zeros(shape),
-            heading_rad=np.zeros(shape),
-            speed_mps=vehicles.speed_mps.copy(),
-            measured_speed_mps=np.zeros(shape),
-            hidden=np.zeros(shape, dtype=np.bool_),
-        )
+        poses = empty_poses(*vehicles.driving.shape)
+        poses.mask[:] = vehicles.driving
+        poses.id[:] = vehicles.id
+        poses.speed_mps[:] = vehicles.speed_mps
         world, view = self.world, self._view
         reveal(
             world.ego,
@@ -291,6 +293,25 @@ class Simulation:
         )
         poses.hidden[:] = vehicles.driving & ~view.seen
         poses.measured_speed_mps[:] = view.measured_mps
+        return poses
+
+    def phantom_poses(self) -> VehiclePoses:
+        """Return the phantoms (B, M), or (B, 0); the mask has those that the sensor reports now."""
+        world, reported = self.world, self._reported
+        count = reported.seen.shape[1] - self.state.vehicles.driving.shape[1]
+        poses = empty_poses(self.batch, count)
+        if count > 0:
+            reveal_phantoms(
+                world.ego,
+                world.paths,
+                world.lanes,
+                world.obstacles.corners,
+                self.settings,
+                self.state.episodes,
+                self._view,
+                reported,
+                poses,
+            )
         return poses
 
     def obstacles(self, episode: int = 0) -> list[Floats]:

@@ -98,7 +98,8 @@ def start_traffic(
         for i in range(count):
             p, desired, yields[b, i] = draw_vehicle(seed, i + 1, draws, first_entry, entry_path)
             ids[b, i], follows_ego[b, i], path[b, i] = i + 1, False, p
-            speed_mps[b, i] = desired_mps[b, i] = min(desired, limit_mps[p])
+            speed_mps[b, i] = draws.overspeed_factor * min(desired, limit_mps[p])
+            desired_mps[b, i] = speed_mps[b, i]
             low, high = min(nearest_m, zone_m[p]), min(furthest_m, zone_m[p])
             for attempt in range(_ATTEMPTS):
                 draw = (i + 1) * _ATTEMPTS + attempt

@@ -10,6 +10,8 @@ from risk_dqn_planner.situation.situations import Booleans, Floats, Integers
 
 NOBODY = -1
 NO_ACTION = -1
+# More than there are ids of vehicles in an episode.
+MOST_IDS = 1 << 20
 
 
 class Episodes(NamedTuple):

@@ -10,9 +10,11 @@ from risk_dqn_planner.compiled import kernel
 from risk_dqn_planner.geometry.footprint import footprints_overlap
 from risk_dqn_planner.situation.situations import Floats, Integers
 from sim_bridge.simulation.dynamics import accelerate, follow_target, target_speed
+from sim_bridge.simulation.lags import Lags, take_effect
 from sim_bridge.simulation.population import let_one_in, replace_those_gone
+from sim_bridge.simulation.reacting import brake_for_egos
 from sim_bridge.simulation.right_of_way import Crossings, give_way
-from sim_bridge.simulation.settings import Settings
+from sim_bridge.simulation.settings import NEVER, Settings
 from sim_bridge.simulation.state import NO_ACTION, Counts, Episodes, SimulationState, Vehicles
 from sim_bridge.simulation.traffic import (
     find_leaders,
@@ -42,6 +44,7 @@ def advance(
     settings: Settings,
     state: SimulationState,
     actions: Integers,
+    lags: Lags,
     shadows: Floats,
     steps: int,
 ) -> None:
@@ -65,10 +68,26 @@ def advance(
             wait_for_others(idm, episodes, vehicles)
         if settings.draws.yielding_share > 0.0:
             yield_to_egos(paths, lanes, idm, episodes, vehicles)
+        if settings.reaction.after_steps != NEVER:
+            brake_for_egos(
+                ego,
+                paths,
+                lanes,
+                corners,
+                settings,
+                episodes,
+                vehicles,
+                lags.noticed,
+                shadows,
+            )
         move_vehicles(
             paths.exit_m, paths.lane, settings.step_s, episodes, vehicles, counts.last_left_s
         )
-        move_egos(settings, episodes, actions)
+        if settings.delay_steps > 0:
+            take_effect(lags, episodes, actions)
+            move_egos(settings, episodes, lags.in_force)
+        else:
+            move_egos(settings, episodes, actions)
         note_time_gaps(first_zone_m, lanes, paths, settings.step_s, state)
         detect_collisions(ego, paths, episodes, vehicles)
         conclude(ego.goal_m, settings.limit_steps, episodes, counts)
@@ -133,7 +152,7 @@ def move_vehicles(
 
 @kernel
 def move_egos(settings: Settings, episodes: Episodes, actions: Integers) -> None:
-    """Let every ego carry out its action (B,), and let time pass."""
+    """Let every ego carry out its action (B,), or keep its speed without one; let time pass."""
     running, tick, phase = episodes.running, episodes.tick, episodes.phase
     s_m, step_m, speed_mps = episodes.ego_s_m, episodes.ego_step_m, episodes.ego_speed_mps
     ego, decision_steps = settings.ego, settings.decision_steps
@@ -142,9 +161,12 @@ def move_egos(settings: Settings, episodes: Episodes, actions: Integers) -> None
             continue
         tick[b] += 1
         phase[b] = phase[b] + 1 if phase[b] + 1 < decision_steps else 0
+        target_mps = target_speed(actions[b], ego.slow_mps, ego.fast_mps)
+        if actions[b] == NO_ACTION:
+            target_mps = speed_mps[b]
         step_m[b], speed_mps[b] = follow_target(
             speed_mps[b],
-            target_speed(actions[b], ego.slow_mps, ego.fast_mps),
+            target_mps,
             settings.step_s,
             ego.acceleration_mps2,
             ego.braking_mps2,

@@ -4,7 +4,7 @@ import pytest
 
 from risk_dqn_planner.situation.inputs import EgoPose
 from sim_bridge.environment.place import load_place
-from sim_bridge.perception.perception import VehiclePoses
+from sim_bridge.perception.poses import VehiclePoses
 from sim_bridge.ros.publishing import ground_truth, perceived
 from sim_bridge.scenarios.loading import load_scenario
 
@@ -26,10 +26,17 @@ def poses(hidden: list[bool], present: list[bool]) -> VehiclePoses:
 
 
 def test_the_sensor_reports_measured_speeds_of_what_it_sees() -> None:
-    seen = perceived(poses([False, True, False], [True, True, False]), 4.0, 2.0)
+    nothing = poses([], [])
+    seen = perceived(poses([False, True, False], [True, True, False]), nothing, 4.0, 2.0)
     assert seen.id.tolist() == [10]
     assert seen.speed_mps.tolist() == [6.5]
     assert (seen.length_m.tolist(), seen.width_m.tolist()) == ([4.0], [2.0])
+
+
+def test_the_sensor_reports_phantoms_after_the_vehicles_it_sees() -> None:
+    phantoms = poses([False, False], [False, True])
+    seen = perceived(poses([False, True], [True, True]), phantoms, 4.0, 2.0)
+    assert seen.id.tolist() == [10, 11]
 
 
 def test_the_truth_has_hidden_vehicles_with_their_true_speed_and_the_obstacles() -> None:

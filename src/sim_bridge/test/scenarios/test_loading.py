@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from risk_dqn_planner.errors import ScenarioError
-from sim_bridge.scenarios.fields import Interval, Scenario, Sensor, Timing, Traffic
+from sim_bridge.scenarios.fields import EgoStart, Interval, Scenario, Sensor, Timing, Traffic
 from sim_bridge.scenarios.loading import load_scenario, load_scenarios, scenario_names
 
 
@@ -26,6 +26,28 @@ def test_the_package_has_every_scenario_of_the_paper_and_finite_traffic():
         "finite_traffic",
         "finite_dense",
     } <= set(scenario_names())
+
+
+def test_the_package_has_every_violated_assumption_and_traffic_that_brakes():
+    assert {
+        "others_over_the_limit",
+        "weak_brakes",
+        "delay_200ms",
+        "delay_500ms",
+        "missed_detections",
+        "phantom_detections",
+        "velocity_bias",
+        "braking_traffic",
+    } <= set(scenario_names())
+
+
+def test_braking_traffic_is_a_field_that_any_scenario_takes_and_gives_back(tmp_path: Path):
+    text = "extends: severe_occlusion\ntraffic:\n  brakes_for_ego_after_s: 1\n"
+    mine = load_scenario(write(tmp_path, "mine", text))
+    assert mine.traffic.brakes_for_ego_after_s == 1.0
+    assert mine.obstacles == load_scenario("severe_occlusion").obstacles
+    text = "extends: mine\ntraffic:\n  brakes_for_ego_after_s: null\n"
+    assert load_scenario(write(tmp_path, "never", text)).traffic == load_scenario("base").traffic
 
 
 def test_every_scenario_of_the_package_is_valid_and_says_what_it_is():
@@ -87,6 +109,9 @@ def test_a_users_file_extends_another_one_beside_it(tmp_path: Path):
         ("traffic:\n  vehicles: [0.5, 2]\n", ["Traffic.vehicles", "whole numbers"]),
         ("traffic:\n  desired_speed_mps: [5, 3]\n", ["traffic.desired_speed_mps", "lower one"]),
         ("traffic:\n  respawn: 1\n", ["traffic.respawn", "true or false"]),
+        ("traffic:\n  brakes_for_ego_after_s: late\n", ["brakes_for_ego_after_s", "a number"]),
+        ("traffic:\n  overspeed_factor: null\n", ["traffic.overspeed_factor", "a number"]),
+        ("ego:\n  actuation_delay_s: 0.15\n", ["EgoStart.actuation_delay_s", "inner_step_s"]),
         ("obstacles: 3\n", ["obstacles", "a group of fields"]),
         ("obstacles:\n  per_side: true\n", ["obstacles.per_side", "a whole number"]),
         ("sensor:\n  vehicles_occlude: true\n", ["Sensor.vehicles_occlude", "not supported"]),
@@ -107,7 +132,7 @@ def test_a_broken_file_is_refused_with_its_path_and_field(
 
 
 def test_an_unknown_name_is_answered_with_the_known_ones():
-    with pytest.raises(ScenarioError, match=r"'bose'.*base, close_small_obstacle"):
+    with pytest.raises(ScenarioError, match=r"'bose'.*base, .*close_small_obstacle"):
         load_scenario("bose")
 
 
@@ -126,7 +151,16 @@ def test_a_default_scenario_takes_five_inner_steps_a_decision_and_lasts_600():
         (Traffic, {"yielding_share": 1.1}),
         (Traffic, {"headway_s": -0.1}),
         (Traffic, {"vehicles": Interval(-1, 2)}),
+        (Traffic, {"overspeed_factor": 0.0}),
+        (Traffic, {"brakes_for_ego_after_s": -0.1}),
+        (Traffic, {"brakes_for_ego_mps2": 0.0}),
+        (EgoStart, {"braking_factor": 0.0}),
+        (EgoStart, {"actuation_delay_s": -0.1}),
+        (EgoStart, {"actuation_delay_s": 11.0}),
         (Sensor, {"velocity_noise_mps": -1.0}),
+        (Sensor, {"velocity_bias_mps": float("nan")}),
+        (Sensor, {"missed_share": 1.1}),
+        (Sensor, {"phantom_share": -0.1}),
         (Sensor, {"range_m": float("inf")}),
     ],
 )

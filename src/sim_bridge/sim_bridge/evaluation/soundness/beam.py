@@ -149,7 +149,7 @@ class Beam:
         """Carry out all that is allowed, in `wide`, and return what it led to."""
         check, allowed = self._allowed()
         parent, action = np.nonzero(allowed)
-        copy_rows(self._narrow.state, parent, self._wide.state)
+        copy_rows(self._narrow, parent, self._wide)
         given = np.zeros(self._wide.batch, dtype=np.int64)
         given[: len(action)] = action
         self._outcome = outcomes(self._wide.step(given))
@@ -221,7 +221,7 @@ class Beam:
     def _take_over(self, check: JointCheck | None, moments: Moments) -> None:
         """Make the chosen moments the present ones."""
         count = len(moments.row)
-        copy_rows(self._wide.state, moments.row, self._narrow.state)
+        copy_rows(self._wide, moments.row, self._narrow)
         parent, action = np.zeros((2, self._narrow.batch), dtype=np.int64)
         parent[:count], action[:count] = moments.parent, moments.action
         keep_memory(self._narrow, parent)

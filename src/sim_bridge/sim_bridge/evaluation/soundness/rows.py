@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from risk_dqn_planner.situation.situations import Integers
 from sim_bridge.simulation.simulation import Simulation
-from sim_bridge.simulation.state import SimulationState
 
 
 def _arrays(state: tuple[Any, ...]) -> Iterator[NDArray[Any]]:
@@ -23,12 +22,13 @@ def _arrays(state: tuple[Any, ...]) -> Iterator[NDArray[Any]]:
             yield part
 
 
-def copy_rows(source: SimulationState, rows: Integers, target: SimulationState) -> None:
-    """Copy episodes `rows` (K,) of one state to the first K places of another; the rest ends."""
+def copy_rows(source: Simulation, rows: Integers, target: Simulation) -> None:
+    """Copy episodes `rows` (K,) of one simulation to the first K of another; the rest ends."""
     count = len(rows)
-    for old, new in zip(_arrays(source), _arrays(target), strict=True):
+    old_state, new_state = (source.state, source.lags), (target.state, target.lags)
+    for old, new in zip(_arrays(old_state), _arrays(new_state), strict=True):
         new[:count] = old[rows]
-    target.episodes.running[count:] = False
+    target.state.episodes.running[count:] = False
 
 
 def keep_memory(simulation: Simulation, rows: Integers) -> None:

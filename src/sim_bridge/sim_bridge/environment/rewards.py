@@ -43,21 +43,22 @@ class RewardConfig:
 
 
 # Paper: Table I for the weights; section "RL with collision-aware reward" for the events (it
-# names -200 and +100 elsewhere, as an example of earlier work). Ours, `progress` and `joint_risk`,
-# are for training under the supervisor: where nothing sound collides, what is left to learn is to
-# arrive soon and smoothly.
+# names -200 and +100 elsewhere, as an example of earlier work). Ours, `arrival`, `progress` and
+# `joint_risk`, are for training under the supervisor: where nothing sound collides, what is left to
+# learn is to arrive soon and smoothly.
 REWARDS = {
     "risk": RewardConfig(risk_weight=0.8, utility_weight=0.2),
     "risk_with_occlusions": RewardConfig(risk_weight=0.8, utility_weight=0.2, include_hidden=True),
     "collision": RewardConfig(collision=-2.0, goal=1.0, step=-0.00001),
-    "progress": RewardConfig(collision=-2.0, goal=1.0, step=-0.01, switch=-0.03, hard_brake=-0.03),
+    "arrival": RewardConfig(collision=-2.0, goal=1.0, step=-0.01),
+    "progress": RewardConfig(collision=-2.0, goal=1.0, step=-0.01, switch=-0.05, hard_brake=-0.03),
     "joint_risk": RewardConfig(
         risk_weight=0.02,
         include_hidden=True,
         collision=-2.0,
         goal=1.0,
         step=-0.01,
-        switch=-0.03,
+        switch=-0.05,
         hard_brake=-0.03,
     ),
 }

@@ -43,14 +43,19 @@ class ReplayConfig:
 
 @dataclass(frozen=True)
 class ExplorationConfig:
-    """Epsilon-greedy exploration: from start to end linearly over `share` of the run."""
+    """Epsilon-greedy exploration: from start to end linearly over `share` of the run.
+
+    repeat: probability of a random action to be taken once more, so that the ego does one thing
+    for long enough to come into other situations (temporally extended, Dabney et al. 2021).
+    """
 
     start: float = 1.0
     end: float = 0.05
     share: float = 0.25
+    repeat: float = 0.0
 
     def __post_init__(self) -> None:
-        for name in ("start", "end", "share"):
+        for name in ("start", "end", "share", "repeat"):
             value = getattr(self, name)
             _require(0.0 <= value <= 1.0, f"ExplorationConfig.{name}", value, "0 to 1")
 

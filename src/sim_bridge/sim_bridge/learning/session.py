@@ -72,14 +72,16 @@ class Run:
     def description(self) -> dict[str, Any]:
         """Return all of it as JSON; what is not used is left out.
 
-        So a run without supervisor and memory is described, and its policy's file written, as
-        before there was either.
+        So a run without supervisor, memory and repeated exploration is described, and its
+        policy's file written, as before there was any of them.
         """
         found = asdict(self)
         if not self.supervised:
             del found["supervisor"], found["assumptions"]
         if self.memory == INSTANTANEOUS:
             del found["memory"]
+        if self.config.exploration.repeat == 0.0:
+            del found["config"]["exploration"]["repeat"]
         return found
 
     @property

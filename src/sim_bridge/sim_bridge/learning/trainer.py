@@ -51,6 +51,9 @@ class Trainer:
         self._random = np.random.default_rng([seed, 1])
         self._states = environment.reset().copy()
         self._sound = environment.sound.copy()
+        # Where the last action was a random one, and which.
+        self._explored = np.zeros(environment.batch, dtype=np.bool_)
+        self._drawn = np.zeros(environment.batch, dtype=np.int64)
         self._steps = 0
         self._episodes = 0
         self._updates = 0
@@ -100,6 +103,8 @@ class Trainer:
         batch = self._environment.batch
         explore = self._random.random(batch) < self._config.exploration.epsilon(self.progress)
         actions = self._any_actions()
+        if self._config.exploration.repeat > 0.0:
+            actions, explore = self._repeated(actions, explore)
         if explore.all():
             return actions
         values = self._learner.q_values(self._states)
@@ -113,6 +118,17 @@ class Trainer:
         while not (sound := self._sound[np.arange(batch), actions]).all():
             actions = np.where(sound, actions, self._random.integers(0, len(Action), batch))
         return actions
+
+    def _repeated(
+        self, actions: NDArray[np.int64], explore: NDArray[np.bool_]
+    ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+        """Let some random actions be those of the step before, where they still are sound."""
+        batch = self._environment.batch
+        again = self._explored & (self._random.random(batch) < self._config.exploration.repeat)
+        again &= self._sound[np.arange(batch), self._drawn]
+        self._drawn = np.where(again, self._drawn, actions)
+        self._explored = explore | again
+        return self._drawn, self._explored
 
     def _learn(self) -> None:
         drawn = self._replay.sample(
@@ -154,6 +170,7 @@ class Trainer:
             "random": self._random.bit_generator.state,
             "states": self._states.copy(),
             "sound": self._sound.copy(),
+            "random_actions": (self._explored.copy(), self._drawn.copy()),
             "counts": (self._steps, self._episodes, self._updates, self._reports),
         }
 
@@ -167,5 +184,7 @@ class Trainer:
         self._states[:] = state["states"]
         # Runs from before actions were ruled out know no other than sound ones.
         self._sound[:] = state.get("sound", True)
+        if "random_actions" in state:
+            self._explored, self._drawn = (array.copy() for array in state["random_actions"])
         self._steps, self._episodes, self._updates, self._reports = state["counts"]
         self._restart_report()

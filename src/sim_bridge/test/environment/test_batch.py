@@ -178,7 +178,7 @@ def test_switching_and_hard_braking_are_priced_as_the_statistics_count_them() ->
         assert (step.outcome == Outcome.RUNNING).all()
         statistics = one.simulation.statistics()
         now = statistics.action_changes - changes, statistics.hard_brakes - brakes
-        assert step.reward == pytest.approx(-0.01 - 0.03 * (now[0] + now[1]))
+        assert step.reward == pytest.approx(-0.01 - 0.05 * now[0] - 0.03 * now[1])
         changes, brakes = statistics.action_changes, statistics.hard_brakes
     assert changes.tolist() == [2] * 4
     assert (brakes > 0).all()

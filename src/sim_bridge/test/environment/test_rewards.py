@@ -72,18 +72,18 @@ def test_collision_pays_for_events_alone() -> None:
 def test_progress_pays_for_time_for_switching_and_for_hard_braking() -> None:
     s = situation(5.0, 4.0, vehicle=True)
     assert reward("progress", s) == pytest.approx(-0.01)
-    assert reward("progress", s, switched=True) == pytest.approx(-0.04)
-    assert reward("progress", s, switched=True, hard_braked=True) == pytest.approx(-0.07)
+    assert reward("progress", s, switched=True) == pytest.approx(-0.06)
+    assert reward("progress", s, switched=True, hard_braked=True) == pytest.approx(-0.09)
     assert reward("progress", s, at_goal=True) == 1.0
 
 
 def test_joint_risk_is_progress_and_some_of_the_risk() -> None:
     # Risk -1 as above: where the ego can neither stop nor leave first.
     s = situation(5.0, 4.0, vehicle=True)
-    assert reward("joint_risk", s, switched=True) == pytest.approx(-0.04 - 0.02)
+    assert reward("joint_risk", s, switched=True) == pytest.approx(-0.06 - 0.02)
     assert reward("collision", s, switched=True) == reward("collision", s)
 
 
 def test_an_unknown_reward_is_refused_by_name() -> None:
-    with pytest.raises(ConfigurationError, match="no reward 'comfort', expected one of: collision"):
+    with pytest.raises(ConfigurationError, match="no reward 'comfort', expected one of: arrival"):
         reward_named("comfort")

@@ -38,5 +38,7 @@ def test_numbers_out_of_range_are_refused_by_name() -> None:
 
 
 def test_an_unknown_preset_is_refused_by_name() -> None:
-    with pytest.raises(ConfigurationError, match="no preset 'fast', expected one of: paper, tuned"):
+    with pytest.raises(
+        ConfigurationError, match="no preset 'fast', expected one of: paper, supervised"
+    ):
         preset_named("fast")

@@ -117,3 +117,25 @@ def test_epsilon_falls_linearly_then_stays() -> None:
     exploration = ExplorationConfig(start=1.0, end=0.2, share=0.5)
     found = [exploration.epsilon(p) for p in (0.0, 0.25, 0.5, 1.0)]
     assert found == pytest.approx([1.0, 0.6, 0.2, 0.2])
+
+
+def test_random_actions_are_repeated_as_often_as_the_configuration_says() -> None:
+    walk = Walk(1, LENGTH, Outcome.SUCCESS)
+    config = replace(
+        CONFIGURATION, environments=1, steps=3000, exploration=ExplorationConfig(1.0, 1.0, 0.0, 0.7)
+    )
+    actions = walk.follow()
+    reports(Trainer(config, walk, learner(config), 0))
+    same = np.mean(np.array(actions[1:]) == np.array(actions[:-1]))
+    # Repeated, or drawn anew and the same by chance: 0.7 + 0.3 / 3; 0.03 is 4 standard deviations.
+    assert same == pytest.approx(0.8, abs=0.03)
+
+
+def test_repeated_exploration_resumes_bit_for_bit() -> None:
+    config = replace(CONFIGURATION, exploration=ExplorationConfig(repeat=0.8))
+    whole, begun, resumed = trainer(config), trainer(config), trainer(config, seed=5)
+    reports(whole)
+    next(begun.run())
+    resumed.load_state_dict(begun.state_dict())
+    reports(resumed)
+    np.testing.assert_array_equal(values(resumed), values(whole))

@@ -57,6 +57,7 @@ class Walk:
         self._position = np.zeros(batch, dtype=np.int64)
         self._sound = np.arange(3) != ruled_out
         self.taken = np.zeros(3, dtype=np.int64)
+        self._followed: list[int] = []
 
     @property
     def sound(self) -> NDArray[np.bool_]:
@@ -68,6 +69,7 @@ class Walk:
 
     def step(self, actions: NDArray[np.int64]) -> EnvironmentStep:
         self.taken += np.bincount(actions, minlength=3)
+        self._followed.append(int(actions[0]))
         begin = self._position == self._length
         self._position = np.where(begin, 0, self._position + (actions == 2))
         ended = self._position == self._length
@@ -79,6 +81,10 @@ class Walk:
             outcome=np.where(ended, self._outcome, Outcome.RUNNING).astype(np.int64),
             states=positions(self._position),
         )
+
+    def follow(self) -> list[int]:
+        """The actions of the first environment, as they come."""
+        return self._followed
 
     def state_dict(self) -> dict[str, Any]:
         return {"position": self._position.copy()}

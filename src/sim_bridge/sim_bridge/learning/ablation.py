@@ -1,0 +1,218 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What works under the supervisor, and what does not: variants of one training, several seeds each.
+
+`python -m sim_bridge.learning.ablation` trains every variant with every seed, drives each policy
+under the enforcing supervisor through test episodes, and writes table.md and results.json into the
+output folder. Run again, it goes on where it was. Exit code: 0 done, 2 an option is no good, 130
+interrupted.
+"""
+
+import argparse
+import json
+import sys
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from risk_dqn_planner.errors import ConfigurationError, PlannerError
+from risk_dqn_planner.policies.learned import LearnedPolicy
+from risk_dqn_planner.policies.policy_file import load_policy_file
+from risk_dqn_planner.policies.supervised import Supervisor
+from sim_bridge.environment.episodes import DrivenEpisodes, drive
+from sim_bridge.environment.interface import Outcome
+from sim_bridge.environment.place import Place, load_place
+from sim_bridge.environment.seeds import TEST_SEEDS, fixed_seeds
+from sim_bridge.learning.checkpoint import POLICY, RunFolder
+from sim_bridge.learning.export import initial_weights
+from sim_bridge.learning.presets import preset_named
+from sim_bridge.learning.session import Run, Session
+from sim_bridge.scenarios.loading import load_scenario
+
+CHECKPOINT_EVERY_S = 30.0
+INTERRUPTED = 130
+SCENARIOS = "base,dense_traffic,severe_occlusion,close_small_obstacle"
+
+Change = Callable[[Run], Run]
+Figures = dict[str, float]
+
+
+def _config(**changes: int) -> Change:
+    return lambda run: replace(run, config=replace(run.config, **changes))  # type: ignore[arg-type]
+
+
+def _repeat(share: float) -> Change:
+    def change(run: Run) -> Run:
+        exploration = replace(run.config.exploration, repeat=share)
+        return replace(run, config=replace(run.config, exploration=exploration))
+
+    return change
+
+
+# Each differs from the first in one thing.
+VARIANTS: Mapping[str, Change] = {
+    "reference": lambda run: run,
+    "no_supervisor": lambda run: replace(run, supervisor="off"),
+    "no_memory": lambda run: replace(run, memory="instantaneous"),
+    "reward_collision": lambda run: replace(run, reward="collision"),
+    "reward_arrival": lambda run: replace(run, reward="arrival"),
+    "reward_joint_risk": lambda run: replace(run, reward="joint_risk"),
+    "one_step": _config(n_step=1),
+    "ten_steps": _config(n_step=10),
+    "one_update": _config(updates_per_step=1),
+    "no_repeat": _repeat(0.0),
+}
+
+# Means over a policy's episodes in all cells, in the order of the table.
+COLUMNS = {
+    "success": "success %",
+    "collision": "collision %",
+    "timeout": "timeout %",
+    "mean_speed_mps": "speed m/s",
+    "switch_share": "changes % of steps",
+    "hard_brake_share": "hard brakes % of steps",
+}
+
+
+def figures_of(cells: Sequence[DrivenEpisodes]) -> Figures:
+    """Return COLUMNS of all episodes together, shares in [0, 1]."""
+    outcome = np.concatenate([cell.outcome for cell in cells])
+    speed_mps = np.concatenate([cell.statistics.mean_speed_mps for cell in cells])
+    steps = sum(int(cell.statistics.action_counts.sum()) for cell in cells)
+    changes = sum(int(cell.statistics.action_changes.sum()) for cell in cells)
+    brakes = sum(int(cell.statistics.hard_brakes.sum()) for cell in cells)
+    return {
+        "success": float(np.mean(outcome == Outcome.SUCCESS)),
+        "collision": float(np.mean(outcome == Outcome.COLLISION)),
+        "timeout": float(np.mean(outcome == Outcome.TIMEOUT)),
+        "mean_speed_mps": float(speed_mps.mean()),
+        "switch_share": changes / steps,
+        "hard_brake_share": brakes / steps,
+    }
+
+
+def table_of(results: Mapping[str, Sequence[Figures]]) -> str:
+    """Return a table in Markdown: mean over the seeds, and the lowest and highest of them."""
+    lines = ["| variant | seeds | " + " | ".join(COLUMNS.values()) + " |"]
+    lines += ["|" + " --- |" * (2 + len(COLUMNS))]
+    for variant, seeds in results.items():
+        cells = [_spread([one[name] for one in seeds], name) for name in COLUMNS]
+        lines.append(f"| {variant} | {len(seeds)} | " + " | ".join(cells) + " |")
+    return "\n".join(lines) + "\n"
+
+
+def _spread(values: Sequence[float], name: str) -> str:
+    scale, digits = (1.0, 2) if name == "mean_speed_mps" else (100.0, 1)
+    mean, low, high = (
+        f"{scale * each:.{digits}f}" for each in (np.mean(values), min(values), max(values))
+    )
+    return f"{mean} [{low}, {high}]"
+
+
+def _train(run: Run, places: Sequence[Place], folder: Path) -> None:
+    """Train to the end, or go on with it, unless it is done already."""
+    files = RunFolder(folder, run)
+    if files.finished:
+        return
+    session = Session(run, places, initial_weights(run.seed))
+    files.resume(session)
+    for _ in session.run():
+        files.save(session, every_s=CHECKPOINT_EVERY_S)
+    files.finish(session, folder.name)
+
+
+def _drive(run: Run, places: Sequence[Place], policy: Path, episodes: int) -> Figures:
+    """Drive test episodes in each cell of the run, under the enforcing supervisor."""
+    file = load_policy_file(policy)
+    supervised = Supervisor(
+        LearnedPolicy(file.module, file.name, file.sha256), assumptions=run.assumptions
+    )
+    seeds = fixed_seeds(TEST_SEEDS, episodes)
+    return figures_of(
+        [
+            drive(place.simulation(load_scenario(name), episodes, run.memory), supervised, seeds)
+            for place in places
+            for name in run.scenarios
+        ]
+    )
+
+
+def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog="ablation", description=__doc__)
+    add = parser.add_argument
+    add("--variants", default=",".join(VARIANTS), help="names, by commas [%(default)s]")
+    add("--seeds", default="0,1,2", help="of the trainings, by commas [%(default)s]")
+    add("--preset", default="supervised", help="of the reference [%(default)s]")
+    add("--steps", type=int, help="environment steps instead of the preset's")
+    add("--map", default="four_way", help="own maps, by commas [%(default)s]")
+    add("--scenario", default=SCENARIOS, help="names or .yaml files, by commas [%(default)s]")
+    add("--episodes", type=int, default=1000, help="test episodes in each cell [%(default)s]")
+    add("--out", type=Path, default=Path("out/ablation"), help="folder [%(default)s]")
+    return parser.parse_args(argv)
+
+
+def _reference(arguments: argparse.Namespace) -> Run:
+    config = preset_named(arguments.preset)
+    if arguments.steps is not None:
+        config = replace(config, steps=arguments.steps)
+    return Run(
+        config=config,
+        reward="progress",
+        seed=0,
+        map_name=arguments.map,
+        scenario=arguments.scenario,
+        supervisor="enforce",
+        memory="tracked",
+    )
+
+
+def _changes(names: Iterable[str]) -> dict[str, Change]:
+    changes = {}
+    for name in names:
+        if name not in VARIANTS:
+            raise ConfigurationError(
+                f"there is no variant '{name}', expected one of: {', '.join(VARIANTS)}"
+            )
+        changes[name] = VARIANTS[name]
+    return changes
+
+
+def _seeds(text: str) -> list[int]:
+    try:
+        return [int(part) for part in text.split(",")]
+    except ValueError:
+        raise ConfigurationError(f"seeds is '{text}', expected whole numbers by commas") from None
+
+
+def _compare(arguments: argparse.Namespace) -> None:
+    reference, changes = _reference(arguments), _changes(arguments.variants.split(","))
+    seeds, out = _seeds(arguments.seeds), arguments.out
+    places = [load_place(name) for name in reference.map_names]
+    results: dict[str, list[Figures]] = {}
+    for name, change in changes.items():
+        for seed in seeds:
+            run, folder = replace(change(reference), seed=seed), out / f"{name}_seed{seed}"
+            _train(run, places, folder)
+            figures = _drive(run, places, folder / POLICY, arguments.episodes)
+            results.setdefault(name, []).append(figures)
+            print(f"{folder}: {figures}", flush=True)
+            (out / "results.json").write_text(json.dumps(results, indent=1) + "\n", "utf-8")
+            (out / "table.md").write_text(table_of(results), encoding="utf-8")
+    print(table_of(results))
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Compare the variants as the command line says."""
+    try:
+        _compare(_arguments(argv))
+    except PlannerError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        return INTERRUPTED
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

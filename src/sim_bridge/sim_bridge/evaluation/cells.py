@@ -24,8 +24,8 @@ RANGES_M = (40.0, 60.0, 90.0)
 class Cell:
     """One distribution of episodes, and how its ego perceives them.
 
-    scenario: name or file; sensor_range_m, sensor_forward_m: None as it says. memory: see
-    SituationConfig.
+    scenario: name or file; sensor_range_m, sensor_forward_m, brakes_for_ego_after_s: None as it
+    says. memory: see SituationConfig.
     """
 
     scenario: str
@@ -33,6 +33,7 @@ class Cell:
     sensor_range_m: float | None = None
     sensor_forward_m: float | None = None
     memory: str = INSTANTANEOUS
+    brakes_for_ego_after_s: float | None = None
 
     def load(self) -> Scenario:
         """Return the scenario of this cell.
@@ -47,8 +48,10 @@ class Cell:
         if self.sensor_forward_m is not None:
             sensor = replace(sensor, forward_offset_m=self.sensor_forward_m)
         scenario = replace(scenario, sensor=sensor)
-        respawn = self.traffic == RESPAWNING
-        return replace(scenario, traffic=replace(scenario.traffic, respawn=respawn))
+        traffic = replace(scenario.traffic, respawn=self.traffic == RESPAWNING)
+        if self.brakes_for_ego_after_s is not None:
+            traffic = replace(traffic, brakes_for_ego_after_s=self.brakes_for_ego_after_s)
+        return replace(scenario, traffic=traffic)
 
 
 def paper_cells() -> list[Cell]:

@@ -26,6 +26,8 @@ SCENARIOS = (
 SENSORS_M = (0.0, 2.0)
 # Highest speeds ascribed to hidden vehicles; the last one is their lane's limit: no risk accepted.
 HIDDEN_TOP_MPS = (0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, NO_CAP_MPS)
+# Traffic that never cares for the ego, and traffic that brakes so long after it could see it.
+BRAKES_AFTER_S = (None, 1.0)
 VIOLATIONS = (
     "others_over_the_limit", "weak_brakes", "delay_200ms", "delay_500ms", "missed_detections",
     "phantom_detections", "velocity_bias",
@@ -94,12 +96,13 @@ def _memory() -> Iterator[SoundnessCell]:
 
 def _frontier() -> Iterator[SoundnessCell]:
     """Where the worst case forbids most; a hidden vehicle that is slower than the truth is risk."""
-    cell = Cell(OCCLUDED, RESPAWNING, sensor_forward_m=0.0)
-    for top_mps in HIDDEN_TOP_MPS:
-        assumptions = SafetyAssumptions(hidden_top_speed_mps=top_mps)
-        holds = top_mps == NO_CAP_MPS
-        policies = (FASTEST_SOUND, SUPERVISED)
-        yield SoundnessCell(FRONTIER, MAPS[0], cell, assumptions, policies, holds, limits=holds)
+    policies = (FASTEST_SOUND, SUPERVISED)
+    for after_s in BRAKES_AFTER_S:
+        cell = Cell(OCCLUDED, RESPAWNING, sensor_forward_m=0.0, brakes_for_ego_after_s=after_s)
+        for top_mps in HIDDEN_TOP_MPS:
+            own = SafetyAssumptions(hidden_top_speed_mps=top_mps)
+            holds = top_mps == NO_CAP_MPS
+            yield SoundnessCell(FRONTIER, MAPS[0], cell, own, policies, holds, limits=holds)
 
 
 def _violated() -> Iterator[SoundnessCell]:

@@ -166,6 +166,7 @@ def _described(line: Line, cell: SoundnessCell) -> Line:
         **line,
         "sensor_forward_m": cell.cell.sensor_forward_m,
         "memory": cell.cell.memory,
+        "brakes_for_ego_after_s": cell.cell.brakes_for_ego_after_s,
         "hidden_top_speed_mps": cell.assumptions.hidden_top_speed_mps,
         "speed_error_mps": cell.assumptions.speed_error_mps,
         "sound": is_sound(line["policy"]),

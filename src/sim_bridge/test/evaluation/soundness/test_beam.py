@@ -10,6 +10,7 @@ from risk_dqn_planner.intersection.model import IntersectionModel
 from risk_dqn_planner.policies.fastest_sound import FastestSoundPolicy
 from risk_dqn_planner.safety.assumptions import SafetyAssumptions
 from risk_dqn_planner.safety.guard import Guard
+from risk_dqn_planner.situation.config import INSTANTANEOUS, TRACKED
 from sim_bridge.environment.episodes import DrivenEpisodes, drive
 from sim_bridge.environment.interface import Outcome
 from sim_bridge.evaluation.clairvoyant import optima
@@ -66,8 +67,9 @@ def searched(
     config: BeamConfig,
     seeds: np.ndarray = SEEDS,
     batch: int = 2048,
+    memory: str = INSTANTANEOUS,
 ) -> DrivenEpisodes:
-    narrow, wide = (Simulation(model, scenario, rows) for rows in (batch, 3 * batch))
+    narrow, wide = (Simulation(model, scenario, rows, memory=memory) for rows in (batch, 3 * batch))
     return Beam(narrow, wide, assumptions, config).search(seeds)
 
 
@@ -108,13 +110,15 @@ def test_without_a_check_it_finds_the_clairvoyant_s_optimum(
     np.testing.assert_array_equal(found, np.maximum(expected, 0))
 
 
+@pytest.mark.parametrize("memory", [INSTANTANEOUS, TRACKED])
 def test_a_narrow_beam_is_never_slower_than_the_fastest_sound_action(
-    crossing_model: IntersectionModel, busy: Scenario
+    crossing_model: IntersectionModel, busy: Scenario, memory: str
 ) -> None:
     seeds = np.arange(20)
-    driven = drive(Simulation(crossing_model, busy, 20), FastestSoundPolicy(), seeds)
+    simulation = Simulation(crossing_model, busy, 20, memory=memory)
+    driven = drive(simulation, FastestSoundPolicy(), seeds)
     narrow = searched(
-        crossing_model, busy, SafetyAssumptions(), BeamConfig(width=8), seeds, batch=64
+        crossing_model, busy, SafetyAssumptions(), BeamConfig(width=8), seeds, 64, memory
     )
     assert (narrow.outcome[driven.outcome == Outcome.SUCCESS] == Outcome.SUCCESS).all()
     assert (steps(narrow) <= steps(driven))[driven.outcome == Outcome.SUCCESS].all()

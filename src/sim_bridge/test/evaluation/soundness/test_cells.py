@@ -11,6 +11,7 @@ from sim_bridge.evaluation.soundness.cells import (
     MEMORY,
     SCENARIOS,
     VIOLATED,
+    missing_scenarios,
     soundness_cells,
 )
 from sim_bridge.evaluation.soundness.drivers import Drivers, is_sound
@@ -46,8 +47,10 @@ def test_only_where_speeds_are_noisy_the_check_allows_for_errors() -> None:
 def test_accepted_risk_goes_from_standing_ghosts_up_to_none() -> None:
     frontier = [each for each in soundness_cells() if each.part == FRONTIER]
     caps = [each.assumptions.hidden_top_speed_mps for each in frontier]
-    assert caps == [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, NO_CAP_MPS]
-    assert [each.holds for each in frontier] == [False] * 7 + [True]
+    assert caps == [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, NO_CAP_MPS] * 2
+    assert [each.holds for each in frontier] == ([False] * 7 + [True]) * 2
+    brakes = [each.cell.load().traffic.brakes_for_ego_after_s for each in frontier]
+    assert brakes == [None] * 8 + [1.0] * 8
 
 
 def test_memory_is_tried_where_something_stands_close() -> None:
@@ -59,6 +62,8 @@ def test_memory_is_tried_where_something_stands_close() -> None:
 def test_a_broken_assumption_is_never_held_against_a_policy() -> None:
     broken = [each for each in soundness_cells() if each.part == VIOLATED]
     assert [each.cell.scenario for each in broken if each.holds] == ["base", "base"]
+    assert missing_scenarios() == []
+    assert len({each.cell.scenario for each in broken}) == 1 + 7
 
 
 def test_contestants_take_over_the_cell_s_assumptions() -> None:

@@ -50,7 +50,7 @@ def test_lines_hold_limits_and_causes_beside_the_usual_figures(folder: Path) -> 
         assert causes <= 2
         assert {"success", "mean_speed_mps", "switch_share", "hard_brake_share"} <= line.keys()
     frontier = [line for line in lines if line["part"] == "frontier"]
-    assert [line["policy"] for line in frontier].count("fastest_sound") == 8
+    assert [line["policy"] for line in frontier].count("fastest_sound") == 2 * 8
 
 
 def test_the_page_shows_every_part_that_was_driven(folder: Path) -> None:

@@ -17,6 +17,7 @@ from sim_bridge.evaluation.soundness.reporting.tables import (
     SUCCESS_WANTED,
     Line,
     by_map,
+    by_traffic,
     collisions_in_all,
     full,
     limits_of,
@@ -88,7 +89,7 @@ _FRONTIER = """\
 
 Under severe occlusion the worst case forbids most. `hidden_top_speed_mps` caps the speed that is
 ascribed to hidden vehicles: lower values accept the risk that one is faster. The last row accepts
-none. Map `{map}`, sensor at the centre, traffic that never yields.
+none. Map `{map}`, sensor at the centre. Clairvoyant and sound limit stand beside it.
 """
 
 _VIOLATED = """\
@@ -208,14 +209,12 @@ def _memory(lines: Sequence[Line], without: Sequence[Line]) -> str:
 def _frontier(lines: Sequence[Line], links: Sequence[str]) -> str:
     if not lines:
         return ""
-    images = [f"![Collisions against success and crossing time]({link})\n" for link in links]
-    return "\n".join(
-        (
-            _FRONTIER.format(map=lines[0]["map"]),
-            *images,
-            full(lines, top_speed, "cap, m/s"),
-        )
-    )
+    parts = [_FRONTIER.format(map=lines[0]["map"])]
+    parts += [f"![Collisions against success and crossing time]({link})\n" for link in links]
+    for traffic, own in by_traffic(lines).items():
+        parts.append(f"### {traffic}\n")
+        parts.append(full(own, top_speed, "cap, m/s"))
+    return "\n".join(parts)
 
 
 def _violated(lines: Sequence[Line]) -> str:

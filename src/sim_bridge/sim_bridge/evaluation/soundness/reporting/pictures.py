@@ -10,7 +10,13 @@ from matplotlib.figure import Figure
 from sim_bridge.evaluation.clairvoyant import NAME as CLAIRVOYANT
 from sim_bridge.evaluation.reporting.plotting import WIDTH_IN, colors, save
 from sim_bridge.evaluation.soundness.limits import SOUND_LIMIT
-from sim_bridge.evaluation.soundness.reporting.tables import LIMITS, Line, policies_of, top_speed
+from sim_bridge.evaluation.soundness.reporting.tables import (
+    LIMITS,
+    Line,
+    by_traffic,
+    policies_of,
+    top_speed,
+)
 
 FRONTIER_PNG = "accepted_risk.png"
 # Rates of 0 have no place on a logarithmic axis: they stand at the interval's end.
@@ -20,15 +26,17 @@ _STYLES = {CLAIRVOYANT: (0, (1, 2)), SOUND_LIMIT: (0, (5, 2))}
 
 def draw_frontier(lines: Sequence[Line], folder: Path) -> list[Path]:
     """Draw the frontier; return its file, or nothing if there is nothing to draw."""
-    names = policies_of(lines)
-    if not names:
+    groups = by_traffic(lines)
+    if not policies_of(lines):
         return []
-    figure = Figure(figsize=(WIDTH_IN, 4.4), layout="constrained")
-    left, right = figure.subplots(1, 2)
-    figure.suptitle("Accepted risk: the highest speed ascribed to hidden vehicles", fontsize=13)
-    _panel(left, lines, "success", 100.0, "success [%]")
-    _panel(right, lines, "crossing_time_s", 1.0, "crossing time [s]")
-    handles, labels = left.get_legend_handles_labels()
+    figure = Figure(figsize=(WIDTH_IN, 0.8 + 3.6 * len(groups)), layout="constrained")
+    panels = figure.subplots(len(groups), 2, squeeze=False)
+    figure.suptitle("Accepted risk: the highest speed [m/s] ascribed to hidden vehicles")
+    for (left, right), (traffic, own) in zip(panels, groups.items(), strict=True):
+        left.set_title(traffic, fontsize=10, loc="left")
+        _panel(left, own, "success", 100.0, "success [%]")
+        _panel(right, own, "crossing_time_s", 1.0, "crossing time [s]")
+    handles, labels = panels[0, 0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=4, frameon=False)
     return [save(figure, folder / FRONTIER_PNG)]
 

@@ -75,6 +75,18 @@ def top_speed(line: Line) -> str:
     return "the limit (sound)" if mps == NO_CAP_MPS else f"{mps:g}"
 
 
+def by_traffic(lines: Iterable[Line]) -> dict[str, list[Line]]:
+    """Return the lines by how traffic treats the ego, in words."""
+    found: dict[str, list[Line]] = {}
+    for line in lines:
+        after_s = line["brakes_for_ego_after_s"]
+        name = "Traffic that never yields"
+        if after_s is not None:
+            name = f"Traffic that brakes {after_s:g} s after it could see the ego"
+        found.setdefault(name, []).append(line)
+    return found
+
+
 def by_map(
     lines: Sequence[Line], policy: str, show: Callable[[Line | None], str], title: str
 ) -> str:

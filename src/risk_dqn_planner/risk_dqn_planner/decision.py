@@ -164,10 +164,13 @@ def _outlook(
 ) -> str:
     """Say what follows for the ego from the action that is forbidden.
 
-    Where the joint check forbids it, `lacking_s` is no NaN: nothing would be left to do.
+    Where the joint check forbids it, `lacking_s` is no NaN: nothing would be left to do. It is 0
+    where a policy looks ahead, and does without what is sound.
     """
     if np.isnan(lacking_s):
         return _leaving(s, lane, action, config)
+    if lacking_s <= 0.0:
+        return "the ego keeps back for a run-up"
     forbidden = Action(min(action + 1, Action.FAST)) if proposed is None else proposed
     by = f" by {lacking_s:.1f} s" if np.isfinite(lacking_s) else ""
     return f"no safe manoeuvre would be left after {forbidden.name}{by}"

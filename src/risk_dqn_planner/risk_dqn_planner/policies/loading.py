@@ -10,6 +10,7 @@ from risk_dqn_planner.errors import PolicyError, UnknownPolicyError
 from risk_dqn_planner.policies.base import Action, Policy, StopsAtGoal
 from risk_dqn_planner.policies.constant import ConstantPolicy
 from risk_dqn_planner.policies.fastest_sound import FastestSoundPolicy
+from risk_dqn_planner.policies.look_ahead import LookAheadPolicy
 from risk_dqn_planner.policies.rule_based import RuleBasedConfig, RuleBasedPolicy
 from risk_dqn_planner.policies.shipped import ShippedPolicy, shipped_policies
 from risk_dqn_planner.state.encoding import StateConfig
@@ -25,6 +26,7 @@ def _constant(action: Action, config: RuleBasedConfig) -> Policy:  # noqa: ARG00
 BUILT_IN: Mapping[str, PolicyFactory] = {
     "rule_based": RuleBasedPolicy,
     "fastest_sound": FastestSoundPolicy.from_config,
+    "look_ahead": LookAheadPolicy.from_config,
     "always_stop": partial(_constant, Action.STOP),
     "always_slow": partial(_constant, Action.SLOW),
     "always_fast": partial(_constant, Action.FAST),

@@ -7,25 +7,28 @@ from risk_dqn_planner.safety.assumptions import SafetyAssumptions
 from risk_dqn_planner.safety.commitment import Commitments
 from risk_dqn_planner.safety.familiarity import Familiarity
 from risk_dqn_planner.safety.joint_check import JointCheck, joint_check
-from risk_dqn_planner.situation.situations import Booleans, Integers, Situations
+from risk_dqn_planner.situation.situations import Booleans, Floats, Integers, Situations
 
 
 class Guard:
     """For each decision call `look`, choose, and call `decided`.
 
     Where nothing is admissible, `otherwise` is what was verified last: sound all the same.
+    Public for reading: in_force (B,) and reacted_m (B, M), as in `joint_check`, of the last look.
     """
 
     def __init__(self, assumptions: SafetyAssumptions | None = None) -> None:
         self.assumptions = assumptions or SafetyAssumptions()
         self._commitments = Commitments()
         self._familiarity = Familiarity(self.assumptions)
+        self.in_force: Integers = np.empty(0, dtype=np.int64)
+        self.reacted_m: Floats = np.empty((0, 0))
 
     def look(self, situations: Situations, restart: Booleans) -> JointCheck:
         """Check the actions of B situations; `restart` (B,) marks where the memory is void."""
-        in_force = self._commitments.in_force(restart)
-        reacted_m = self._familiarity.reacted_m(situations, restart)
-        return joint_check(situations, self.assumptions, in_force, reacted_m)
+        self.in_force = self._commitments.in_force(restart)
+        self.reacted_m = self._familiarity.reacted_m(situations, restart)
+        return joint_check(situations, self.assumptions, self.in_force, self.reacted_m)
 
     def otherwise(self) -> Integers:
         """Return the action (B,) that carries on with the manoeuvre verified last."""

@@ -1,0 +1,123 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What one search is about, and the room that it needs."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from risk_dqn_planner.safety.assumptions import SafetyNumbers
+from risk_dqn_planner.situation.situations import (
+    Booleans,
+    Floats,
+    Integers,
+    Situations,
+    empty_situations,
+)
+
+
+class SearchNumbers(NamedTuple):
+    """LookAheadConfig flattened to the numbers that kernels read."""
+
+    decisions: int
+    cell_m: float
+    cell_mps: float
+    switching_s: float
+    gap_price: float
+
+
+class Task(NamedTuple):
+    """A row of B situations to be searched; all ways are the ego's from now on.
+
+    s, row, p: as in the joint check. c: of the search. reacted_m, corner_m (B, M): as in
+    `joint_check` and in sight.py. sound (B, 3): the actions to choose from. in_force (B,): the
+    action before.
+    """
+
+    s: Situations
+    row: int
+    p: SafetyNumbers
+    c: SearchNumbers
+    reacted_m: Floats
+    corner_m: Floats
+    sound: Booleans
+    in_force: Integers
+
+
+class Nodes(NamedTuple):
+    """States at two decisions, one after the other, all (2, C).
+
+    way_m, speed_mps: of the ego. cost_s: price of the changes of action. first: the action that
+    led here; last: the one in force.
+    """
+
+    way_m: Floats
+    speed_mps: Floats
+    cost_s: Floats
+    first: Integers
+    last: Integers
+
+
+class Places(NamedTuple):
+    """Where the ego may wait, all (M,): `count` of them hold.
+
+    rest_m: how far it is; clear_m: to the end of the zones behind, up to the next place. joins:
+    it waits to join a lane.
+    """
+
+    rest_m: Floats
+    clear_m: Floats
+    joins: Booleans
+
+
+class Work(NamedTuple):
+    """Room for one search; to be had from `work_for`.
+
+    ahead: row k is the situation predicted for decision k, seen from the state in hand.
+    reacted_m (D, M). arrival_s, who (M,): of anyone; of_vehicles_s, nearest (M,): of perceived
+    vehicles. stamp, node (C,): for cells of way and speed the decision that used them last, and
+    the state in them. total_s, action (1,): of the best plan so far. critical (2,): vehicle and
+    lane that forbid to go at once, -1 nobody.
+    """
+
+    ahead: Situations
+    reacted_m: Floats
+    arrival_s: Floats
+    who: Integers
+    of_vehicles_s: Floats
+    nearest: Integers
+    places: Places
+    nodes: Nodes
+    stamp: Integers
+    node: Integers
+    total_s: Floats
+    action: Integers
+    critical: Integers
+
+
+def work_for(c: SearchNumbers, p: SafetyNumbers, vehicles: int, lanes: int) -> Work:
+    """Return room to search situations of N vehicles and M lanes."""
+    furthest_m = c.decisions * p.period_s * p.fast_mps
+    # Egos that are faster than Fast at first share the last cells.
+    cells = (math.ceil(furthest_m / c.cell_m) + 1) * (int(p.fast_mps / c.cell_mps) + 2)
+    return Work(
+        ahead=empty_situations(c.decisions, vehicles, lanes),
+        reacted_m=np.empty((c.decisions, lanes)),
+        arrival_s=np.empty(lanes),
+        who=np.empty(lanes, dtype=np.int64),
+        of_vehicles_s=np.empty(lanes),
+        nearest=np.empty(lanes, dtype=np.int64),
+        places=Places(np.empty(lanes), np.empty(lanes), np.empty(lanes, dtype=np.bool_)),
+        nodes=Nodes(
+            way_m=np.empty((2, cells)),
+            speed_mps=np.empty((2, cells)),
+            cost_s=np.empty((2, cells)),
+            first=np.empty((2, cells), dtype=np.int64),
+            last=np.empty((2, cells), dtype=np.int64),
+        ),
+        stamp=np.empty(cells, dtype=np.int64),
+        node=np.empty(cells, dtype=np.int64),
+        total_s=np.empty(1),
+        action=np.empty(1, dtype=np.int64),
+        critical=np.empty(2, dtype=np.int64),
+    )

@@ -22,7 +22,7 @@ from sim_bridge.ros.planner_link import DECISION_PERIOD_NS, PlannerLink
 from sim_bridge.ros.session import wait_until
 
 ANSWER_S = 10.0
-START_S = 120.0
+START_S = 240.0
 
 
 @dataclass(frozen=True)

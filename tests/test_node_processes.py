@@ -24,7 +24,7 @@ from sim_bridge.ros.session import ros_session, wait_until
 
 pytestmark = pytest.mark.ros
 
-PATIENCE_S = 60.0
+PATIENCE_S = 180.0  # where nothing is compiled yet
 
 Start = Callable[[NodeCommand], NodeProcess]
 
@@ -120,6 +120,21 @@ def test_a_simulator_with_an_unknown_scenario_names_those_there_are(
 ) -> None:
     process = start(replace(settings, scenario="rush_hour").simulator_command(0.0))
     assert "there is no scenario 'rush_hour', expected one of: base" in complaint(process)
+
+
+def test_a_policy_node_with_an_unknown_supervisor_names_those_there_are(
+    start: Start, settings: RunSettings
+) -> None:
+    command = replace(settings, supervisor="strict").planner_commands()[1]
+    assert "'strict', expected one of: off, report, enforce" in complaint(start(command))
+
+
+def test_assumptions_that_contradict_each_other_end_the_policy_node(
+    start: Start, settings: RunSettings
+) -> None:
+    weaker = {"safety.leader_braking_mps2": 3.0}
+    command = replace(settings, overrides=weaker).planner_commands()[1]
+    assert "leader_braking_mps2 is 3.0, expected at least" in complaint(start(command))
 
 
 def test_a_policy_that_cannot_be_loaded_stops_the_ego_for_ever(

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Time per situation of risk, state and rule, with 8 vehicles and 4 lanes.
+"""Time per situation of risk, state and rule, with 8 vehicles and 4 lanes, and of a decision.
 
-Run as `python benchmarks/bench_core.py`; the best of several rounds counts, first calls (which
-compile) do not.
+Run as `python benchmarks/bench_core.py`. Of the parts the best of several rounds counts, first
+calls (which compile) do not. A decision is what the policy node takes for one situation with 50
+vehicles: network, supervisor and words; its percentiles are over single decisions.
 """
 
 import sys
@@ -11,24 +12,30 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from risk_dqn_planner.decision import explain
+from risk_dqn_planner.policies.base import Policy
 from risk_dqn_planner.policies.rule_based import RuleBasedPolicy
+from risk_dqn_planner.policies.shipped import DEFAULT_POLICY
+from risk_dqn_planner.policies.supervised import SupervisorMode
+from risk_dqn_planner.policies.supervised_loading import load_supervised
 from risk_dqn_planner.risk.risk import RiskConfig, assess
 from risk_dqn_planner.situation.situations import Situations, empty_situations
 from risk_dqn_planner.state.history import StateEncoder
 
 VEHICLES, LANES, STEPS, ROUNDS = 8, 4, 5, 30
+MANY_VEHICLES, DECISIONS, FIRST_DECISIONS = 50, 5000, 100
 
 
-def drive(batch: int) -> list[Situations]:
+def drive(batch: int, vehicles: int = VEHICLES) -> list[Situations]:
     """Situations of a few decision steps: everyone keeps the speed."""
     rng = np.random.default_rng(0)
-    s = empty_situations(batch, VEHICLES, LANES)
-    n, m = (batch, VEHICLES), (batch, LANES)
+    s = empty_situations(batch, vehicles, LANES)
+    n, m = (batch, vehicles), (batch, LANES)
     s.stop_line_distance_m[:] = rng.uniform(-10.0, 40.0, batch)
     s.goal_distance_m[:] = s.stop_line_distance_m + 22.0
     s.ego_speed_mps[:] = rng.uniform(0.0, 5.0, batch)
     s.vehicle_mask[:] = True
-    s.vehicle_id[:] = np.arange(VEHICLES)
+    s.vehicle_id[:] = np.arange(vehicles)
     s.vehicle_lane[:] = rng.integers(0, LANES, n)
     s.vehicle_distance_m[:] = rng.uniform(-5.0, 70.0, n)
     s.vehicle_speed_mps[:] = rng.uniform(0.0, 8.0, n)
@@ -84,14 +91,37 @@ def measure(batches: Sequence[int] = (1, 1024)) -> dict[str, dict[str, float]]:
     }
 
 
+def decision_ms(policy: Policy, decisions: int = DECISIONS) -> dict[str, float]:
+    """Return how long one decision with its words takes: median, p99 and most [ms]."""
+    scenes, times_ms = drive(1, MANY_VEHICLES), []
+    for count in range(FIRST_DECISIONS + decisions):
+        scene = scenes[count % STEPS]
+        begin_s = time.perf_counter()
+        explain(policy.decide(scene, np.array([count % STEPS == 0])), scene, 0, policy)
+        times_ms.append(1e3 * (time.perf_counter() - begin_s))
+    counted = np.array(times_ms[FIRST_DECISIONS:])
+    p50, p99 = np.percentile(counted, (50, 99))
+    return {"p50": float(p50), "p99": float(p99), "most": float(counted.max())}
+
+
+def print_decisions() -> None:
+    """Print how long decisions take, without and with the supervisor."""
+    sys.stdout.write(f"\n{'ms per decision':<24}{'p50':>12}{'p99':>12}{'most':>12}\n")
+    for mode in SupervisorMode:
+        found = decision_ms(load_supervised(DEFAULT_POLICY, mode))
+        row = "".join(f"{value:>12.3f}" for value in found.values())
+        sys.stdout.write(f"{f'{DEFAULT_POLICY}, {mode.value}':<24}{row}\n")
+
+
 def main() -> None:
-    """Print a table of all measurements."""
+    """Print all measurements."""
     found = measure()
     heads = "".join(f"{name:>12}" for name in found["assess"])
     sys.stdout.write(f"{'us per situation':<24}{heads}\n")
     for part, times in found.items():
         row = "".join(f"{value:>12.3f}" for value in times.values())
         sys.stdout.write(f"{part:<24}{row}\n")
+    print_decisions()
 
 
 if __name__ == "__main__":

@@ -13,7 +13,8 @@ from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 
 from launch import LaunchDescription
-from risk_dqn_planner.policies.shipped import DEFAULT_POLICY
+from risk_dqn_planner.policies.shipped import DEFAULT_POLICY, DEFAULT_SUPERVISOR
+from risk_dqn_planner.situation.config import SituationConfig
 
 SHARE = get_package_share_path("risk_dqn_planner")
 INPUTS = ("odometry", "objects", "visible_area", "route")
@@ -27,6 +28,8 @@ def arguments() -> list[DeclareLaunchArgument]:
         ("map_origin_longitude", ".nan", "Longitude of the projection's origin [degrees]"),
         ("map_projector", "utm", "utm, local_cartesian, mercator or local_xy"),
         ("policy", DEFAULT_POLICY, "Name of a built-in or trained policy, or a policy file"),
+        ("supervisor", DEFAULT_SUPERVISOR, "Around the policy: off, report or enforce"),
+        ("memory", SituationConfig.memory, "Of hidden space: instantaneous or tracked"),
         ("parameters", str(SHARE / "config" / "planner.yaml"), "File of all other parameters"),
         ("use_sim_time", "false", "Take the time from /clock"),
         ("namespace", "", "Namespace of the nodes"),
@@ -80,6 +83,7 @@ def generate_launch_description() -> LaunchDescription:
         "map_origin_latitude": parameter("map_origin_latitude", float),
         "map_origin_longitude": parameter("map_origin_longitude", float),
         "map_projector": parameter("map_projector", str),
+        "memory": parameter("memory", str),
     }
     situation = node(
         "situation",
@@ -88,7 +92,7 @@ def generate_launch_description() -> LaunchDescription:
     )
     policy = node(
         "policy",
-        sim_time | {"policy": parameter("policy", str)},
+        sim_time | {name: parameter(name, str) for name in ("policy", "supervisor")},
         [("input/situation", "situation"), ("output/decision", "decision")],
     )
     rviz = Node(

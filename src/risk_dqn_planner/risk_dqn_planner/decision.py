@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from risk_dqn_planner.policies.base import Action, Decisions, Policy, Reason, Supervision
 from risk_dqn_planner.policies.rule_based import RuleBasedConfig
+from risk_dqn_planner.policies.supervised import Supervisor
 from risk_dqn_planner.risk.motion import distance_after, speed_after
 from risk_dqn_planner.risk.rewards import leader_gap, leave_time, reach_time
 from risk_dqn_planner.situation.situations import Situations
@@ -60,15 +61,16 @@ def explain(
     """
     config = config or RuleBasedConfig()
     action, reason = Action(int(decisions.action[index])), Reason(int(decisions.reason[index]))
+    proposer = policy.policy.name if isinstance(policy, Supervisor) else policy.name
     vehicle, lane = int(decisions.critical_vehicle[index]), int(decisions.critical_lane[index])
     if reason is Reason.GOAL_REACHED:
         text = "the goal is reached"
     elif reason is Reason.FIXED:
-        text = f"{policy.name} decides the same whatever happens"
+        text = f"{proposer} decides the same whatever happens"
     elif reason is Reason.LEARNED:
         values = zip(Action, decisions.q_values[index], strict=True)
         listed = ", ".join(f"{each.name} {value:.3g}" for each, value in values)
-        text = f"highest value of {policy.name} ({listed})"
+        text = f"highest value of {proposer} ({listed})"
     else:
         text = "" if lane >= 0 else "no conflict within range"
     supervision, proposed = _supervision(decisions, index)

@@ -13,8 +13,9 @@ from risk_dqn_planner.errors import PolicyFileError
 FOLDER = "models"
 SUMS = "SHA256SUMS"
 PACKAGE = "risk_dqn_planner"
-# What decides where nobody says which policy shall.
+# What decides where nobody says which policy shall, and what its supervisor does.
 DEFAULT_POLICY = "tuned"
+DEFAULT_SUPERVISOR = "report"
 
 
 @dataclass(frozen=True)

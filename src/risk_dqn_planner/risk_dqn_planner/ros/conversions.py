@@ -25,6 +25,7 @@ from std_msgs.msg import Header
 
 from risk_dqn_planner.decision import Action, Decision, Reason
 from risk_dqn_planner.errors import InputError
+from risk_dqn_planner.policies.base import Supervision
 from risk_dqn_planner.situation.inputs import EgoPose, ObjectArrays, Perception
 from risk_dqn_planner.situation.report import SituationReport, Status
 from risk_dqn_planner.situation.situations import Floats, Situations, empty_situations
@@ -301,7 +302,8 @@ def decision_to_message(
         action_risks=np.asarray(decision.action_risks, dtype=np.float64),
         critical_vehicle_id=_id_to_message(decision.critical_vehicle_id),
         critical_lane_id=_id_to_message(decision.critical_lane_id),
-        supervisor=DecisionMessage.SUPERVISOR_OFF,
+        supervisor=int(decision.supervision),
+        proposed=int(decision.action if decision.proposed is None else decision.proposed),
         policy_name=decision.policy_name,
         policy_hash=decision.policy_hash,
         situation_stamp=stamp,
@@ -313,10 +315,11 @@ def decision_from_message(message: DecisionMessage) -> Decision:
     """Return the decision; its times stay in the message.
 
     Raises:
-        InputError: unknown action or reason.
+        InputError: unknown action, reason or verdict of the supervisor.
     """
     try:
         action, reason = Action(message.action), Reason(message.reason)
+        supervision, proposed = Supervision(message.supervisor), Action(message.proposed)
     except ValueError as error:
         raise InputError(f"decision: {error}") from error
     return Decision(
@@ -330,6 +333,8 @@ def decision_from_message(message: DecisionMessage) -> Decision:
         critical_lane_id=_id_from_message(message.critical_lane_id),
         policy_name=message.policy_name,
         policy_hash=message.policy_hash,
+        supervision=supervision,
+        proposed=None if supervision is Supervision.OFF else proposed,
     )
 
 

@@ -63,9 +63,21 @@ class Decider:
     """Decides on the newest report; whatever is doubtful is answered with Stop and its reason."""
 
     def __init__(
-        self, policy: Policy | UnusablePolicy, explain: Explain, config: DeciderConfig
+        self,
+        policy: Policy | UnusablePolicy,
+        explain: Explain,
+        config: DeciderConfig,
+        *,
+        restart_after_fault: bool = False,
     ) -> None:
+        """Ask `policy`; `explain` puts its answers into words.
+
+        restart_after_fault: the policy counts on what it decided having been carried out, as
+        supervisors do, so that a Stop in between which was not its own makes its memory void.
+        """
         self._policy = policy
+        self._restart_after_fault = restart_after_fault
+        self._interrupted = False  # by such a Stop, since the policy was asked last
         self._explain = explain
         self._max_age_ns = int(config.max_situation_age_s * SECOND_NS)
         self._max_gap_ns = int(config.max_history_gap_s * SECOND_NS)
@@ -139,11 +151,14 @@ class Decider:
             last is None
             or report.route != last.route
             or report.stamp_ns - last.stamp_ns > self._max_gap_ns
+            or (self._interrupted and self._restart_after_fault)
         )
+        self._interrupted = False
         decisions = policy.decide(situations, np.array([restart]))
         decision = self._explain(decisions, situations, 0, policy)
         return Choice(decision, report.stamp_ns)
 
     def _stop(self, reason: Reason, text: str, report: SituationReport | None = None) -> Choice:
+        self._interrupted = True
         decision = fault_decision(reason, text, self._policy.name, self._policy.hash)
         return Choice(decision, None if report is None else report.stamp_ns)

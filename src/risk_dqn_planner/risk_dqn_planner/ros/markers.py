@@ -16,6 +16,7 @@ from risk_dqn_planner.decision import Action, Decision
 from risk_dqn_planner.geometry.footprint import footprint_corners
 from risk_dqn_planner.geometry.polyline import Polyline
 from risk_dqn_planner.intersection.model import ConflictKind, IntersectionModel
+from risk_dqn_planner.policies.base import Supervision
 from risk_dqn_planner.ros.conversions import header, to_duration
 from risk_dqn_planner.situation.inputs import ObjectArrays, Perception
 from risk_dqn_planner.situation.report import SituationReport
@@ -180,7 +181,13 @@ def _add_hidden(builder: MarkerBuilder, model: IntersectionModel, given: Situati
 
 
 def decision_markers(decision: Decision, stamp_ns: int, frame_id: str) -> MarkerArray:
-    """Return the decision with its reason as a text at the origin of a frame."""
+    """Return the decision with its reason as a text at the origin of a frame.
+
+    Where a supervisor ran, its verdict is the second line.
+    """
     builder = MarkerBuilder(stamp_ns, frame_id)
-    builder.text("decision", 0.0, 0.0, decision.text, _ACTION_COLORS[decision.action])
+    lines = [decision.text]
+    if decision.supervision is not Supervision.OFF:
+        lines.append(f"supervisor: {decision.supervision.name}")
+    builder.text("decision", 0.0, 0.0, "\n".join(lines), _ACTION_COLORS[decision.action])
     return builder.message()

@@ -17,7 +17,10 @@ from rclpy.node import Node
 
 from risk_dqn_planner.errors import ConfigurationError
 from risk_dqn_planner.map.loader import LOCAL_XY, MapOrigin, RoadMap, load_map
-from risk_dqn_planner.policies.shipped import DEFAULT_POLICY
+from risk_dqn_planner.policies.shipped import DEFAULT_POLICY, DEFAULT_SUPERVISOR
+from risk_dqn_planner.policies.supervised import supervisor_mode
+from risk_dqn_planner.safety.assumptions import SafetyAssumptions
+from risk_dqn_planner.vehicle import TrafficLimits, VehicleDimensions
 
 Config = TypeVar("Config")
 
@@ -101,11 +104,18 @@ class ClockParameters:
 
 @dataclass(frozen=True)
 class PolicyParameters:
-    """Which policy decides how often."""
+    """Which policy decides how often, and what is done about actions that are not sound."""
 
     policy: str = field(
         default=DEFAULT_POLICY,
         metadata={"description": "Name of a built-in or trained policy, or a policy file"},
+    )
+    supervisor: str = field(
+        default=DEFAULT_SUPERVISOR,
+        metadata={
+            "description": "What the joint worst-case check does about the policy's actions: off, "
+            "report (decisions say what is not sound) or enforce (a sound action stands in)"
+        },
     )
     rate_hz: float = field(
         default=2.0,
@@ -119,6 +129,26 @@ class PolicyParameters:
         default="base_link",
         metadata={"description": "Frame at whose origin the decision is written for RViz"},
     )
+
+    def __post_init__(self) -> None:
+        supervisor_mode(self.supervisor)
+
+
+def declare_assumptions(node: Node, rate_hz: float, prefix: str = "safety.") -> SafetyAssumptions:
+    """Declare what the supervisor takes for granted; the period between decisions follows.
+
+    Raises:
+        ConfigurationError: as `declare`.
+    """
+    # Lanes bring their limits and the check reads no width: parameters without use would deceive.
+    unused_limit = {"default_speed_limit_mps": TrafficLimits.default_speed_limit_mps}
+    unused_width = {"width_m": VehicleDimensions.width_m}
+    given = {
+        "decision_period_s": 1.0 / rate_hz,
+        "traffic": declare(node, TrafficLimits, f"{prefix}traffic.", unused_limit),
+        "vehicle": declare(node, VehicleDimensions, f"{prefix}vehicle.", unused_width),
+    }
+    return declare(node, SafetyAssumptions, prefix, given)
 
 
 def declare(

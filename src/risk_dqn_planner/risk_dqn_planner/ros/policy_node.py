@@ -2,6 +2,8 @@
 """Publishes a decision twice a second, whatever the inputs do."""
 
 import os
+import traceback
+from functools import partial
 
 import numpy as np
 from intersection_msgs.msg import Decision, Situation
@@ -11,14 +13,20 @@ from visualization_msgs.msg import MarkerArray
 from risk_dqn_planner.decision import Reason, explain
 from risk_dqn_planner.errors import InputError, PolicyError
 from risk_dqn_planner.policies.base import Policy
-from risk_dqn_planner.policies.loading import load_policy
+from risk_dqn_planner.policies.supervised import SupervisorMode, supervisor_mode
+from risk_dqn_planner.policies.supervised_loading import SOUND, config_of, load_supervised
 from risk_dqn_planner.ros import conversions, markers
 from risk_dqn_planner.ros.background import spinning
 from risk_dqn_planner.ros.clock import is_simulated, now_ns, on_clock_back, steady_timer
 from risk_dqn_planner.ros.decider import Choice, Decider, DeciderConfig, UnusablePolicy
 from risk_dqn_planner.ros.diagnostics import ERROR, OK, Diagnostics
 from risk_dqn_planner.ros.main import run
-from risk_dqn_planner.ros.parameters import ClockParameters, PolicyParameters, declare
+from risk_dqn_planner.ros.parameters import (
+    ClockParameters,
+    PolicyParameters,
+    declare,
+    declare_assumptions,
+)
 from risk_dqn_planner.ros.qos import NEWEST
 from risk_dqn_planner.situation.report import SituationReport, Status
 from risk_dqn_planner.situation.warm_up import example_situation
@@ -32,6 +40,9 @@ class PolicyNode(Node):
     def __init__(self) -> None:
         super().__init__("policy")
         self._settings = declare(self, PolicyParameters)
+        self._mode = supervisor_mode(self._settings.supervisor)
+        self._assumptions = declare_assumptions(self, self._settings.rate_hz)
+        self._explain = partial(explain, config=config_of(self._assumptions))
         config = declare(self, DeciderConfig)
         patience_s = declare(self, ClockParameters).sim_time_patience_s
         self._patient = is_simulated(self) and patience_s > 0.0
@@ -43,17 +54,21 @@ class PolicyNode(Node):
         if is_simulated(self):
             # Its clock waits for a planner that is ready: before, there is no time to decide at.
             policy = self._load()
-            self._decider = Decider(policy, explain, config)
+            self._decider = self._decide_by(policy, config)
             self._speak()
         else:
-            self._decider = Decider(self._not_yet(), explain, config)
+            self._decider = self._decide_by(self._not_yet(), config)
             self._speak()
             with spinning(self):
                 policy = self._load()
-            self._decider = Decider(policy, explain, config)
+            self._decider = self._decide_by(policy, config)
         self._clock_back = on_clock_back(self, self._decider.forget)
         self.create_subscription(Situation, "~/input/situation", self._on_situation, NEWEST)
         self.get_logger().info(f"ready with policy {policy.name}")
+
+    def _decide_by(self, policy: Policy | UnusablePolicy, config: DeciderConfig) -> Decider:
+        supervised = self._mode is not SupervisorMode.OFF or self._settings.policy in SOUND
+        return Decider(policy, self._explain, config, restart_after_fault=supervised)
 
     def _speak(self) -> None:
         """Begin to decide twice a second, and to tell about it."""
@@ -64,26 +79,33 @@ class PolicyNode(Node):
         steady_timer(self, DIAGNOSTICS_PERIOD_S, self._diagnostics.publish)
 
     def _not_yet(self) -> UnusablePolicy:
-        """Stand in for the policy while it is loaded, which takes torch some seconds."""
+        """Stand in for the policy while torch is loaded and the check perhaps compiled."""
         name = self._settings.policy
         text = f"policy {name} is still being loaded"
         return UnusablePolicy(name, text, reason=Reason.NO_SITUATION)
 
     def _load(self) -> Policy | UnusablePolicy:
-        """Load the policy and let it decide once, so that the first real decision is not late.
+        """Load the policy and let it decide twice, so that the first real decision is not late.
 
         A vehicle whose policy is broken must hear Stop, not silence.
         """
         name = self._settings.policy
         try:
-            policy = load_policy(name)
+            policy = load_supervised(name, self._mode, self._assumptions)
             for restart in (True, False):
                 situations = example_situation()
-                explain(policy.decide(situations, np.array([restart])), situations, 0, policy)
+                decisions = policy.decide(situations, np.array([restart]))
+                self._explain(decisions, situations, 0, policy)
         except PolicyError as error:
-            self.get_logger().error(f"{error}; every decision will be Stop")
-            return UnusablePolicy(name, str(error))
-        return policy
+            fault = str(error)
+        except Exception as error:  # noqa: BLE001 (a vehicle stops, whatever a policy does)
+            self.get_logger().error(traceback.format_exc())
+            fault = f"policy {name} failed: {type(error).__name__}: {error}"
+        else:
+            return policy
+        fault = " ".join(fault.split())
+        self.get_logger().error(f"{fault}; every decision will be Stop")
+        return UnusablePolicy(name, fault)
 
     def _on_situation(self, message: Situation) -> None:
         try:
@@ -142,7 +164,10 @@ class PolicyNode(Node):
             "reason": decision.reason.name,
             "policy": decision.policy_name,
             "policy_hash": decision.policy_hash,
+            "supervisor": decision.supervision.name,
         }
+        if decision.proposed is not None:
+            values["proposed"] = decision.proposed.name
         self._diagnostics.set("decision", ERROR if faulty else OK, decision.text, values)
 
 

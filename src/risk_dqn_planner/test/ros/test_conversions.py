@@ -16,6 +16,7 @@ from rclpy.serialization import deserialize_message, serialize_message
 
 from risk_dqn_planner.decision import Action, Decision, Reason
 from risk_dqn_planner.errors import InputError
+from risk_dqn_planner.policies.base import Supervision
 from risk_dqn_planner.ros import conversions
 from risk_dqn_planner.situation.inputs import EgoPose, object_arrays
 from risk_dqn_planner.situation.report import SituationReport, Status
@@ -212,6 +213,33 @@ def test_a_decision_survives_the_way_over_the_wire() -> None:
     assert received.situation_age_s == pytest.approx(0.25)
     assert conversions.to_ns(received.situation_stamp) == STAMP_NS - 250_000_000
     assert received.critical_lane_id == DecisionMessage.NO_ID
+
+
+def test_every_verdict_of_the_supervisor_has_the_code_of_the_message() -> None:
+    for verdict in Supervision:
+        assert getattr(DecisionMessage, f"SUPERVISOR_{verdict.name}") == verdict
+
+
+def test_what_was_proposed_survives_the_way_over_the_wire() -> None:
+    overruled = replace(DECISION, supervision=Supervision.OVERRULED, proposed=Action.FAST)
+    message = conversions.decision_to_message(overruled, STAMP_NS)
+    received = deserialize_message(serialize_message(message), DecisionMessage)
+    assert received.supervisor == DecisionMessage.SUPERVISOR_OVERRULED
+    assert received.proposed == DecisionMessage.FAST
+    decision = conversions.decision_from_message(received)
+    assert (decision.supervision, decision.proposed) == (Supervision.OVERRULED, Action.FAST)
+
+
+def test_an_action_that_nobody_checked_is_the_proposed_one() -> None:
+    message = conversions.decision_to_message(DECISION, STAMP_NS)
+    assert message.supervisor == DecisionMessage.SUPERVISOR_OFF
+    assert message.proposed == DecisionMessage.SLOW
+    assert conversions.decision_from_message(message).proposed is None
+
+
+def test_an_unknown_verdict_is_refused() -> None:
+    with pytest.raises(InputError, match="decision: 7 is not a valid Supervision"):
+        conversions.decision_from_message(DecisionMessage(supervisor=7))
 
 
 def test_a_decision_without_a_situation_has_a_negative_age() -> None:

@@ -9,6 +9,8 @@ import pytest
 
 from risk_dqn_planner.decision import Action, Decision, Reason
 from risk_dqn_planner.policies.base import Decisions, Policy
+from risk_dqn_planner.policies.constant import ConstantPolicy
+from risk_dqn_planner.policies.supervised import Supervisor
 from risk_dqn_planner.ros.decider import Choice, Decider, DeciderConfig, UnusablePolicy
 from risk_dqn_planner.situation.report import SituationReport, Status
 from risk_dqn_planner.situation.situations import Booleans, Situations
@@ -206,3 +208,33 @@ def test_a_policy_that_is_not_loaded_yet_stops_the_vehicle_and_says_so() -> None
     assert choice.decision.action is Action.STOP
     assert reason(choice) is Reason.NO_SITUATION
     assert choice.decision.text == f"STOP: {text}"
+
+
+@pytest.mark.parametrize("supervised", [True, False])
+def test_after_a_stop_of_another_s_a_supervisor_s_memory_is_void(supervised: bool) -> None:
+    policy = Recorder()
+    node = Decider(policy, explain, DeciderConfig(), restart_after_fault=supervised)
+    decide_at(node, 0, report(0))
+    decide_at(node, 500, SituationReport(500 * MS, Status.INVALID_INPUT, "odd"))
+    decide_at(node, 700, report(700))
+    decide_at(node, 1200, report(1200))
+    assert policy.restarts == [True, supervised, False]
+
+
+class BrokenCheck(Supervisor):
+    """A supervisor whose check fails."""
+
+    def __init__(self) -> None:
+        super().__init__(ConstantPolicy(Action.FAST))
+
+    def decide(self, situations: Situations, restart: Booleans) -> Decisions:
+        super().decide(situations, restart)
+        raise ZeroDivisionError("no gap")
+
+
+def test_a_supervisor_that_fails_is_answered_with_stop() -> None:
+    choice = decide_at(decider(BrokenCheck()), 1000, report(1000))
+    assert reason(choice) is Reason.POLICY_FAILED
+    assert choice.decision.text == (
+        "STOP: policy always_fast+supervisor failed: ZeroDivisionError: no gap"
+    )

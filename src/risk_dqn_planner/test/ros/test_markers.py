@@ -8,6 +8,7 @@ import pytest
 from visualization_msgs.msg import Marker, MarkerArray
 
 from risk_dqn_planner.decision import Action, Decision, Reason
+from risk_dqn_planner.policies.base import Supervision
 from risk_dqn_planner.ros.markers import decision_markers, situation_markers
 from risk_dqn_planner.situation.builder import SituationBuilder
 from risk_dqn_planner.situation.inputs import EgoPose, Perception, object_arrays
@@ -98,3 +99,13 @@ def test_the_decision_is_written_at_the_origin_of_its_frame() -> None:
     assert marker.text == "STOP: vehicle 17"
     assert (marker.pose.position.x, marker.pose.position.y) == (0.0, 0.0)
     assert marker.lifetime.sec == 1
+
+
+def test_the_verdict_of_a_supervisor_is_written_below_the_decision() -> None:
+    none = np.full(3, math.nan)
+    decision = Decision(
+        Action.STOP, 0.0, Reason.VEHICLE, "STOP: vehicle 17", none, none, 17, 3, "p", "",
+        Supervision.OVERRULED, Action.FAST,
+    )  # fmt: skip
+    (marker,) = by_namespace(decision_markers(decision, STAMP_NS, "map"))["decision"]
+    assert marker.text == "STOP: vehicle 17\nsupervisor: OVERRULED"

@@ -23,10 +23,12 @@ from risk_dqn_planner.ros.parameters import (
     MapParameters,
     PolicyParameters,
     declare,
+    declare_assumptions,
 )
 from risk_dqn_planner.ros.synchroniser import SynchroniserConfig
+from risk_dqn_planner.safety.assumptions import SafetyAssumptions
 from risk_dqn_planner.situation.config import SituationConfig
-from risk_dqn_planner.vehicle import VehicleDimensions
+from risk_dqn_planner.vehicle import EgoLimits, TrafficLimits, VehicleDimensions
 
 MakeNode = Callable[..., Node]
 
@@ -124,6 +126,52 @@ def test_a_map_without_a_file_or_an_origin_is_refused_by_name() -> None:
         MapParameters(map_file="x.osm", map_origin_latitude=49.0).load()
 
 
+def test_the_supervisor_assumes_what_its_parameters_say(make_node: MakeNode) -> None:
+    node = make_node(
+        safety__ego__braking_mps2=2.5,
+        safety__traffic__acceleration_mps2=3.0,
+        safety__vehicle__length_m=5.0,
+        safety__speed_error_mps=0.5,
+    )
+    assert declare_assumptions(node, rate_hz=4.0) == SafetyAssumptions(
+        decision_period_s=0.25,
+        speed_error_mps=0.5,
+        ego=EgoLimits(braking_mps2=2.5),
+        traffic=TrafficLimits(acceleration_mps2=3.0),
+        vehicle=VehicleDimensions(length_m=5.0),
+    )
+    gap = node.describe_parameter("safety.safe_gap_s")
+    assert gap.description.startswith("Least time between the ego's leaving")
+    assert gap.floating_point_range[0].to_value == 30.0
+
+
+@pytest.mark.parametrize("name", ["decision_period_s", "traffic.default_speed_limit_mps"])
+def test_what_would_have_no_effect_is_no_parameter(make_node: MakeNode, name: str) -> None:
+    node = make_node()
+    declare_assumptions(node, rate_hz=2.0)
+    assert not node.has_parameter(f"safety.{name}")
+
+
+@pytest.mark.parametrize(
+    ("overrides", "words"),
+    [
+        ({"safety__leader_braking_mps2": 3.0}, "leader_braking_mps2 is 3.0, expected at least"),
+        ({"safety__safe_gap_s": -1.0}, "parameter safety.safe_gap_s: .* from 0 to 30"),
+        ({"safety__ego__slow_mps": 6.0}, "EgoLimits.slow_mps is 6.0, expected less than"),
+    ],
+)
+def test_assumptions_that_contradict_each_other_are_refused(
+    make_node: MakeNode, overrides: dict[str, object], words: str
+) -> None:
+    with pytest.raises(ConfigurationError, match=words):
+        declare_assumptions(make_node(**overrides), rate_hz=2.0)
+
+
+def test_an_unknown_supervisor_is_refused_with_those_there_are() -> None:
+    with pytest.raises(ConfigurationError, match="'strict', expected one of: off, report, enforce"):
+        PolicyParameters(supervisor="strict")
+
+
 def flat(values: dict[str, Any], prefix: str = "") -> dict[str, Any]:
     result: dict[str, Any] = {}
     for name, value in values.items():
@@ -148,9 +196,16 @@ def test_the_parameter_file_holds_all_parameters_with_their_defaults() -> None:
     situation = defaults(
         MapParameters(), EgoParameters(), SynchroniserConfig(), ClockParameters(), SituationConfig()
     ) | flat({"intersection": intersection})
-    policy = defaults(PolicyParameters(), DeciderConfig(), ClockParameters())
-    for argument in ("map_file", "map_origin_latitude", "map_origin_longitude", "map_projector"):
+    safety = dataclasses.asdict(SafetyAssumptions())
+    del safety["decision_period_s"]  # follows from rate_hz
+    del safety["traffic"]["default_speed_limit_mps"], safety["vehicle"]["width_m"]  # without use
+    policy = defaults(PolicyParameters(), DeciderConfig(), ClockParameters()) | flat(
+        {"safety": safety}
+    )
+    for argument in (
+        "map_file", "map_origin_latitude", "map_origin_longitude", "map_projector", "memory"
+    ):  # fmt: skip
         del situation[argument]  # arguments of the launch file
-    del policy["policy"]
+    del policy["policy"], policy["supervisor"]  # too
     assert found["/**/situation"] == pytest.approx(situation, abs=1e-4)
     assert found["/**/policy"] == pytest.approx(policy)

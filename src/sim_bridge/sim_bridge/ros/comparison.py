@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from intersection_msgs.msg import Decision
 
 from risk_dqn_planner.decision import Action, Reason
+from risk_dqn_planner.policies.base import Supervision
 from risk_dqn_planner.ros.conversions import SECOND_NS, to_ns
 
 
@@ -28,6 +29,9 @@ def _describe(decision: Decision) -> str:
         critical += f", vehicle {decision.critical_vehicle_id}"
     if decision.critical_lane_id != Decision.NO_ID:
         critical += f", lane {decision.critical_lane_id}"
+    if decision.supervisor != Decision.SUPERVISOR_OFF:
+        verdict, proposed = Supervision(decision.supervisor).name, Action(decision.proposed).name
+        critical += f", {proposed} {verdict}"
     action, reason = Action(decision.action).name, Reason(decision.reason).name
     return f"{action} ({reason}{critical}: {decision.text})"
 
@@ -39,6 +43,8 @@ def same(recorded: Decision, now: Decision) -> bool:
         and recorded.reason == now.reason
         and recorded.critical_vehicle_id == now.critical_vehicle_id
         and recorded.critical_lane_id == now.critical_lane_id
+        and recorded.supervisor == now.supervisor
+        and recorded.proposed == now.proposed
     )
 
 

@@ -17,8 +17,8 @@ from sim_bridge.ros.run_settings import RunSettings
 from sim_bridge.ros.session import ros_session, wait_until
 from sim_bridge.ros.topics import RESET_SERVICE
 
-# Loading a map and compiling for the first time on a slow computer.
-_START_S = 180.0
+# Loading a map and compiling everything for the first time on a slow computer.
+_START_S = 240.0
 # Longer than the simulator waits for two late answers.
 _SILENCE_S = 30.0
 

@@ -42,7 +42,7 @@ def bags() -> dict[str, Recording]:
     trained = f"{_TRAINED_MAP}_{DEFAULT_POLICY}"
     return {
         **{
-            name: Recording(own_map_settings(name, "rule_based", "demo_light"), 0)
+            name: Recording(own_map_settings(name, "rule_based", "demo_light", supervisor="off"), 0)
             for name in map_names()
         },
         trained: Recording(own_map_settings(_TRAINED_MAP), _TRAINED_SEED),

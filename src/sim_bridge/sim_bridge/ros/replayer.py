@@ -23,7 +23,7 @@ from sim_bridge.ros.run_settings import from_notes
 from sim_bridge.ros.session import SilentPlannerError, ros_session, wait_until
 from sim_bridge.ros.topics import DECISION, INPUTS, OBJECTS, ROUTE, SITUATION
 
-_START_S = 120.0
+_START_S = 240.0
 _LOOK_AGAIN_S = 1.0
 _ANSWER_S = 5.0
 

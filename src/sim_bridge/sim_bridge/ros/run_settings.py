@@ -9,7 +9,9 @@ from pathlib import Path
 from risk_dqn_planner.errors import BagError, ConfigurationError, PlannerError
 from risk_dqn_planner.map.loader import MapOrigin
 from risk_dqn_planner.map.route import parse_route
-from risk_dqn_planner.policies.shipped import DEFAULT_POLICY
+from risk_dqn_planner.policies.shipped import DEFAULT_POLICY, DEFAULT_SUPERVISOR
+from risk_dqn_planner.policies.supervised import supervisor_mode
+from risk_dqn_planner.situation.config import SituationConfig, require_memory
 from sim_bridge.maps import map_names, shipped_map
 from sim_bridge.ros.process import NodeCommand, ParameterValue
 from sim_bridge.ros.topics import remappings
@@ -18,6 +20,7 @@ from sim_bridge.scenarios.loading import load_scenario
 DEFAULT_MAP = "four_way"
 DEFAULT_PROJECTOR = "utm"
 DEFAULT_SCENARIO = "base"
+DEFAULT_MEMORY = SituationConfig.memory
 
 # Lock-step has time: on a busy computer a situation may reach the policy long after the clock.
 _LOCKSTEP: dict[str, ParameterValue] = {"use_sim_time": True, "sim_time_patience_s": 1.0}
@@ -27,8 +30,9 @@ _LOCKSTEP: dict[str, ParameterValue] = {"use_sim_time": True, "sim_time_patience
 class RunSettings:
     """What is driven where, by which policy.
 
-    map_name: name of an own map or path of another. overrides: parameters of the planner's
-    nodes that differ from their defaults.
+    map_name: name of an own map or path of another. supervisor, memory: parameters of the policy
+    and of the situation node. overrides: other parameters of these nodes that differ from their
+    defaults.
     """
 
     map_name: str
@@ -38,6 +42,8 @@ class RunSettings:
     projector: str
     policy: str
     scenario: str
+    supervisor: str = DEFAULT_SUPERVISOR
+    memory: str = DEFAULT_MEMORY
     overrides: Mapping[str, ParameterValue] = field(default_factory=dict)
 
     def notes(self) -> dict[str, str]:
@@ -49,6 +55,8 @@ class RunSettings:
             "projector": self.projector,
             "policy": self.policy,
             "scenario": self.scenario,
+            "supervisor": self.supervisor,
+            "memory": self.memory,
         }
 
     def _map_parameters(self) -> dict[str, ParameterValue]:
@@ -70,9 +78,15 @@ class RunSettings:
             **self._map_parameters(),
             **_LOCKSTEP,
             "sensor_range_m": sensor_range_m,
+            "memory": self.memory,
             **self.overrides,
         }
-        policy = {**_LOCKSTEP, "policy": self.policy, **self.overrides}
+        policy = {
+            **_LOCKSTEP,
+            "policy": self.policy,
+            "supervisor": self.supervisor,
+            **self.overrides,
+        }
         package = "risk_dqn_planner"
         return [
             NodeCommand(package, "situation_node", situation, remappings("situation")),
@@ -110,15 +124,29 @@ def add_run_arguments(parser: argparse.ArgumentParser) -> None:
         "--policy", default=DEFAULT_POLICY, help="name or policy file [%(default)s]"
     )
     parser.add_argument("--scenario", default=DEFAULT_SCENARIO, help="name [%(default)s]")
+    parser.add_argument(
+        "--supervisor",
+        default=DEFAULT_SUPERVISOR,
+        help="around the policy: off, report or enforce [%(default)s]",
+    )
+    parser.add_argument(
+        "--memory",
+        default=DEFAULT_MEMORY,
+        help="of hidden space: instantaneous or tracked [%(default)s]",
+    )
 
 
 def own_map_settings(
-    name: str = DEFAULT_MAP, policy: str = DEFAULT_POLICY, scenario: str = DEFAULT_SCENARIO
+    name: str = DEFAULT_MAP,
+    policy: str = DEFAULT_POLICY,
+    scenario: str = DEFAULT_SCENARIO,
+    supervisor: str = DEFAULT_SUPERVISOR,
 ) -> RunSettings:
     """Return what is driven on an own map when nothing else is asked for."""
     parser = argparse.ArgumentParser()
     add_run_arguments(parser)
     options = ["--map", name, "--policy", policy, "--scenario", scenario]
+    options += ["--supervisor", supervisor]
     return run_settings(parser.parse_args(options))
 
 
@@ -126,8 +154,11 @@ def run_settings(arguments: argparse.Namespace) -> RunSettings:
     """Complete the options: an own map brings its file, route and origin.
 
     Raises:
-        ConfigurationError: a file without route. MapFileError: no such own map. Both name it.
+        ConfigurationError: a file without route, or an option that is none of its values.
+        MapFileError: no such own map. Both name it.
     """
+    supervisor_mode(arguments.supervisor)
+    require_memory(arguments.memory)
     name = str(arguments.map)
     route = parse_route(arguments.route) if arguments.route else None
     origin = MapOrigin.from_text(arguments.origin) if arguments.origin else None
@@ -148,6 +179,8 @@ def run_settings(arguments: argparse.Namespace) -> RunSettings:
         projector=arguments.projector,
         policy=arguments.policy,
         scenario=arguments.scenario,
+        supervisor=arguments.supervisor,
+        memory=arguments.memory,
     )
 
 
@@ -159,7 +192,9 @@ def from_notes(
     Raises:
         BagError: the notes are incomplete or make no sense.
     """
-    expected = ("map", "route", "origin", "projector", "policy", "scenario")
+    expected = (
+        "map", "route", "origin", "projector", "policy", "scenario", "supervisor", "memory"
+    )  # fmt: skip
     missing = [name for name in expected if name not in notes]
     if missing:
         raise BagError(f"{path} does not say with which {missing[0]} it was recorded")

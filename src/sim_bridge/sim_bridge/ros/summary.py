@@ -45,6 +45,8 @@ class RunSummary:
     projector: str
     policy: str
     policy_hash: str
+    supervisor: str
+    memory: str
     scenario: str
     episodes: tuple[EpisodeResult, ...]
 
@@ -82,6 +84,8 @@ def run_summary(
         projector=settings.projector,
         policy=name,
         policy_hash=policy_hash,
+        supervisor=settings.supervisor,
+        memory=settings.memory,
         scenario=settings.scenario,
         episodes=tuple(episodes),
     )

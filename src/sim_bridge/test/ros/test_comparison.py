@@ -37,6 +37,19 @@ def test_another_reason_or_vehicle_is_a_difference() -> None:
     assert difference(before, other_vehicle) is not None
 
 
+def test_another_verdict_of_the_supervisor_is_a_difference_and_named() -> None:
+    before = decision(action=Decision.FAST, proposed=Decision.FAST, text="free")
+    overruled = decision(
+        action=Decision.FAST,
+        supervisor=Decision.SUPERVISOR_OVERRULED,
+        proposed=Decision.SLOW,
+        text="gone",
+    )
+    assert str(difference(before, overruled)) == (
+        "t = 12.5 s: recorded FAST (CLEAR: free); now FAST (CLEAR, SLOW OVERRULED: gone)"
+    )
+
+
 def test_a_decision_that_does_not_come_is_a_difference() -> None:
     missing = difference(decision(action=Decision.STOP), None)
     assert str(missing).endswith("now no decision in time")

@@ -17,6 +17,8 @@ from sim_bridge.ros.demo import main
         (["--projector", "globe"], "'globe'"),
         (["--scenario", "rush_hour"], "'rush_hour'"),
         (["--policy", "nobody"], "'nobody'"),
+        (["--supervisor", "strict"], "'strict'"),
+        (["--memory", "perfect"], "'perfect'"),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else None,
 )

@@ -51,7 +51,8 @@ def test_a_wrong_option_is_named(
 
 
 def test_a_bag_s_notes_give_the_settings_back() -> None:
-    settings = parse("--origin", "49.00000001,8.4", "--scenario", "base", "--policy", "always_slow")
+    options = ["--origin", "49.00000001,8.4", "--scenario", "base", "--policy", "always_slow"]
+    settings = parse(*options, "--supervisor", "report", "--memory", "tracked")
     assert from_notes(settings.map_file, settings.notes(), {}) == settings
 
 
@@ -76,3 +77,10 @@ def test_nodes_get_their_parameters_and_topics_on_the_command_line() -> None:
     assert "~/output/situation:=/situation" in situation
     assert "~/input/situation:=/situation" in policy
     assert f'policy:="{DEFAULT_POLICY}"' in policy
+
+
+def test_supervisor_and_memory_reach_the_node_that_they_belong_to() -> None:
+    commands = parse("--supervisor", "report", "--memory", "tracked").planner_commands()
+    situation, policy = (command.parameters for command in commands)
+    assert (situation.get("memory"), situation.get("supervisor")) == ("tracked", None)
+    assert (policy.get("memory"), policy.get("supervisor")) == (None, "report")

@@ -6,10 +6,11 @@ from collections.abc import Callable, Mapping
 from risk_dqn_planner.policies.base import Policy, StopsAtGoal
 from risk_dqn_planner.policies.fastest_sound import FastestSoundPolicy
 from risk_dqn_planner.policies.loading import load_policy
+from risk_dqn_planner.policies.look_ahead import LookAheadPolicy
 from risk_dqn_planner.policies.supervised import Supervisor
 from risk_dqn_planner.safety.assumptions import SafetyAssumptions
 from sim_bridge.evaluation.rollout import Contestant, PolicyContestant
-from sim_bridge.evaluation.soundness.cells import FASTEST_SOUND, SOUND
+from sim_bridge.evaluation.soundness.cells import FASTEST_SOUND, LOOK_AHEAD, SOUND
 
 _SUPERVISED = "+supervisor"
 
@@ -18,6 +19,7 @@ MakePolicy = Callable[[SafetyAssumptions], Policy]
 # Built-in policies that rest on assumptions.
 _ASSUMING: Mapping[str, MakePolicy] = {
     FASTEST_SOUND: FastestSoundPolicy,
+    LOOK_AHEAD: LookAheadPolicy,
 }
 
 

@@ -68,7 +68,7 @@ def test_a_broken_assumption_is_never_held_against_a_policy() -> None:
 
 def test_contestants_take_over_the_cell_s_assumptions() -> None:
     drivers, careful = Drivers(), SafetyAssumptions(speed_error_mps=4.0)
-    for name in ("fastest_sound", "rule_based+supervisor"):
+    for name in ("fastest_sound", "look_ahead", "rule_based+supervisor"):
         assert is_sound(name)
         usual, other = drivers.of(name, SafetyAssumptions()), drivers.of(name, careful)
         assert usual.name == other.name == name

@@ -44,12 +44,22 @@ class Task(NamedTuple):
     in_force: Integers
 
 
-class Nodes(NamedTuple):
-    """States at two decisions, one after the other, all (2, C).
+class Node(NamedTuple):
+    """A state at one decision of the horizon.
 
     way_m, speed_mps: of the ego. cost_s: price of the changes of action. first: the action that
     led here; last: the one in force.
     """
+
+    way_m: float
+    speed_mps: float
+    cost_s: float
+    first: int
+    last: int
+
+
+class Nodes(NamedTuple):
+    """States at two decisions, one after the other, all (2, C), as in `Node`."""
 
     way_m: Floats
     speed_mps: Floats
@@ -70,14 +80,30 @@ class Places(NamedTuple):
     joins: Booleans
 
 
+class Cells(NamedTuple):
+    """Cells of way and speed (C,): the decision that used them last, and the state in them."""
+
+    stamp: Integers
+    node: Integers
+
+
+class Best(NamedTuple):
+    """The best plan so far: its time and first action (1,).
+
+    critical (2,): vehicle and lane that forbid to go at present, -1 nobody.
+    """
+
+    total_s: Floats
+    action: Integers
+    critical: Integers
+
+
 class Work(NamedTuple):
     """Room for one search; to be had from `work_for`.
 
     ahead: row k is the situation predicted for decision k, seen from the state in hand.
     reacted_m (D, M). arrival_s, who (M,): of anyone; of_vehicles_s, nearest (M,): of perceived
-    vehicles. stamp, node (C,): for cells of way and speed the decision that used them last, and
-    the state in them. total_s, action (1,): of the best plan so far. critical (2,): vehicle and
-    lane that forbid to go at once, -1 nobody.
+    vehicles.
     """
 
     ahead: Situations
@@ -88,11 +114,8 @@ class Work(NamedTuple):
     nearest: Integers
     places: Places
     nodes: Nodes
-    stamp: Integers
-    node: Integers
-    total_s: Floats
-    action: Integers
-    critical: Integers
+    cells: Cells
+    best: Best
 
 
 def work_for(c: SearchNumbers, p: SafetyNumbers, vehicles: int, lanes: int) -> Work:
@@ -115,9 +138,6 @@ def work_for(c: SearchNumbers, p: SafetyNumbers, vehicles: int, lanes: int) -> W
             first=np.empty((2, cells), dtype=np.int64),
             last=np.empty((2, cells), dtype=np.int64),
         ),
-        stamp=np.empty(cells, dtype=np.int64),
-        node=np.empty(cells, dtype=np.int64),
-        total_s=np.empty(1),
-        action=np.empty(1, dtype=np.int64),
-        critical=np.empty(2, dtype=np.int64),
+        cells=Cells(np.empty(cells, dtype=np.int64), np.empty(cells, dtype=np.int64)),
+        best=Best(np.empty(1), np.empty(1, dtype=np.int64), np.empty(2, dtype=np.int64)),
     )

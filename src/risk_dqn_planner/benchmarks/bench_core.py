@@ -3,7 +3,8 @@
 
 Run as `python benchmarks/bench_core.py`. Of the parts the best of several rounds counts, first
 calls (which compile) do not. A decision is what the policy node takes for one situation with 50
-vehicles: network, supervisor and words; its percentiles are over single decisions.
+vehicles: network or search, supervisor and words; its percentiles are over single decisions of
+many egos.
 """
 
 import sys
@@ -23,7 +24,13 @@ from risk_dqn_planner.situation.situations import Situations, empty_situations
 from risk_dqn_planner.state.history import StateEncoder
 
 VEHICLES, LANES, STEPS, ROUNDS = 8, 4, 5, 30
-MANY_VEHICLES, DECISIONS, FIRST_DECISIONS = 50, 5000, 100
+MANY_VEHICLES, EGOS, DECISIONS, FIRST_DECISIONS = 50, 100, 5000, 100
+LOOK_AHEAD = "look_ahead"
+DECIDERS = (
+    *((DEFAULT_POLICY, mode) for mode in SupervisorMode),
+    (LOOK_AHEAD, SupervisorMode.OFF),
+    (LOOK_AHEAD, SupervisorMode.ENFORCE),
+)
 
 
 def drive(batch: int, vehicles: int = VEHICLES) -> list[Situations]:
@@ -93,9 +100,14 @@ def measure(batches: Sequence[int] = (1, 1024)) -> dict[str, dict[str, float]]:
 
 def decision_ms(policy: Policy, decisions: int = DECISIONS) -> dict[str, float]:
     """Return how long one decision with its words takes: median, p99 and most [ms]."""
-    scenes, times_ms = drive(1, MANY_VEHICLES), []
+    steps, times_ms = drive(EGOS, MANY_VEHICLES), []
+    scenes = [
+        Situations._make(field[ego : ego + 1] for field in step)
+        for ego in range(EGOS)
+        for step in steps
+    ]
     for count in range(FIRST_DECISIONS + decisions):
-        scene = scenes[count % STEPS]
+        scene = scenes[count % len(scenes)]
         begin_s = time.perf_counter()
         explain(policy.decide(scene, np.array([count % STEPS == 0])), scene, 0, policy)
         times_ms.append(1e3 * (time.perf_counter() - begin_s))
@@ -105,12 +117,12 @@ def decision_ms(policy: Policy, decisions: int = DECISIONS) -> dict[str, float]:
 
 
 def print_decisions() -> None:
-    """Print how long decisions take, without and with the supervisor."""
+    """Print how long decisions take, of the default policy and of the search."""
     sys.stdout.write(f"\n{'ms per decision':<24}{'p50':>12}{'p99':>12}{'most':>12}\n")
-    for mode in SupervisorMode:
-        found = decision_ms(load_supervised(DEFAULT_POLICY, mode))
+    for name, mode in DECIDERS:
+        found = decision_ms(load_supervised(name, mode))
         row = "".join(f"{value:>12.3f}" for value in found.values())
-        sys.stdout.write(f"{f'{DEFAULT_POLICY}, {mode.value}':<24}{row}\n")
+        sys.stdout.write(f"{f'{name}, {mode.value}':<24}{row}\n")
 
 
 def main() -> None:

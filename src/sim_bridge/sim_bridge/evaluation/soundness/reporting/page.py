@@ -88,8 +88,9 @@ _FRONTIER = """\
 ## Accepted risk
 
 Under severe occlusion the worst case forbids most. `hidden_top_speed_mps` caps the speed that is
-ascribed to hidden vehicles: lower values accept the risk that one is faster. The last row accepts
-none. Map `{map}`, sensor at the centre. Clairvoyant and sound limit stand beside it.
+ascribed to hidden vehicles: lower values accept the risk that one is faster. The last rows accept
+none. Map `{map}`, sensor at the centre. Where nothing collided the mark stands at the picture's
+foot, and the line above it is the interval.
 """
 
 _VIOLATED = """\

@@ -5,24 +5,17 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from risk_dqn_planner.compiled import kernel
 from risk_dqn_planner.situation.situations import Booleans, Floats, Integers, Situations
-from sim_bridge.perception.phantoms import Reported, report_phantoms, report_vehicles
 from sim_bridge.perception.visibility import HALF_PLANES, cast_shadows, first_hidden, hide_points
-from sim_bridge.simulation.randomness import (
-    MISSED_STREAM,
-    NOISE_STREAM,
-    random_normal,
-    random_share,
-)
+from sim_bridge.simulation.randomness import NOISE_STREAM, random_normal
 from sim_bridge.simulation.settings import Settings
 from sim_bridge.simulation.state import MOST_IDS, Episodes, Vehicles
 from sim_bridge.world.matches import Matches
 from sim_bridge.world.path_geometry import table_pose
 from sim_bridge.world.sight_lines import SightLines
-from sim_bridge.world.world import EgoLane, Lanes, Paths
+from sim_bridge.world.world import EgoLane, Lanes
 
 
 class View(NamedTuple):
@@ -112,10 +105,9 @@ def perceive_lanes(
 
 @kernel
 def measured_speed(
-    speed_mps: float, bias_mps: float, noise_mps: float, seed: np.uint64, tick: int, id_: int
+    speed_mps: float, noise_mps: float, seed: np.uint64, tick: int, id_: int
 ) -> float:
     """Return a speed as perceived; the error depends on seed, inner step and id alone."""
-    speed_mps += bias_mps
     if noise_mps <= 0.0:
         return speed_mps
     return speed_mps + noise_mps * random_normal(seed, NOISE_STREAM, tick * MOST_IDS + id_)
@@ -140,8 +132,7 @@ def see_vehicles(
     )
     seed, tick, ids = episodes.seed, episodes.tick, vehicles.id
     x_m, y_m, shadows, cast = view.x_m, view.y_m, view.shadows, view.cast
-    range_m, sensing = settings.sensor_range_m, settings.sensing
-    bias_mps, noise_mps, missed_share = sensing.bias_mps, sensing.noise_mps, sensing.missed_share
+    range_m, noise_mps = settings.sensor_range_m, settings.velocity_noise_mps
     count = driving.shape[1]
     x, y, depth = np.empty(count), np.empty(count), np.empty(count)
     for b in range(driving.shape[0]):
@@ -153,21 +144,8 @@ def see_vehicles(
             seen[b, i] = driving[b, i] & (depth[i] <= 0.0)
             if driving[b, i]:
                 measured_mps[b, i] = measured_speed(
-                    speed_mps[b, i], bias_mps, noise_mps, seed[b], tick[b], ids[b, i]
+                    speed_mps[b, i], noise_mps, seed[b], tick[b], ids[b, i]
                 )
-    if missed_share > 0.0:
-        miss_vehicles(missed_share, seed, tick, ids, seen)
-
-
-@kernel
-def miss_vehicles(
-    share: float, seed: NDArray[np.uint64], tick: Integers, ids: Integers, seen: Booleans
-) -> None:
-    """Take a share of the vehicles from those that are seen (B, N), by seed, inner step and id."""
-    for b in range(seen.shape[0]):
-        for i in range(seen.shape[1]):
-            look_at = tick[b] * MOST_IDS + ids[b, i]
-            seen[b, i] &= random_share(seed[b], MISSED_STREAM, look_at) >= share
 
 
 @kernel
@@ -223,9 +201,8 @@ def match_vehicles(
 @kernel
 def perceive(
     ego: EgoLane,
-    paths: Paths,
+    table: Floats,
     lanes: Lanes,
-    first_path: Integers,
     matches: Matches,
     sight: SightLines,
     corners: Floats,
@@ -233,43 +210,17 @@ def perceive(
     episodes: Episodes,
     vehicles: Vehicles,
     view: View,
-    reported: Reported,
     situations: Situations,
 ) -> None:
     """Fill the situations of all episodes; what describes the lanes for good must be there.
 
-    first_path (M + 1,): of Lanes, or (1,) to look along no lane; corners (2, K, 4, 2): catalogue
-    of the obstacles.
+    table: of Paths; corners (2, K, 4, 2): catalogue of the obstacles.
     """
     look(ego, corners, settings.sensor_offset_m, episodes, view)
     perceive_egos(ego, lanes.ego_zone_center_m, episodes, situations)
     range_m, hidden_m = settings.sensor_range_m, situations.lane_hidden_distance_m
-    perceive_lanes(first_path, sight, range_m, view, hidden_m)
+    perceive_lanes(lanes.first_path, sight, range_m, view, hidden_m)
     seen, measured_mps = view.seen, view.measured_mps
-    see_vehicles(paths.table, settings, episodes, vehicles, view, seen, measured_mps)
-    if settings.sensing.phantom_share > 0.0:
-        report_vehicles(vehicles, seen, measured_mps, reported)
-        report_phantoms(
-            paths,
-            lanes,
-            settings,
-            episodes,
-            view.x_m,
-            view.y_m,
-            view.shadows,
-            view.cast,
-            reported,
-        )
-        match_vehicles(
-            matches,
-            reported.path,
-            reported.s_m,
-            reported.id,
-            reported.seen,
-            reported.measured_mps,
-            situations,
-        )
-    else:
-        match_vehicles(
-            matches, vehicles.path, vehicles.s_m, vehicles.id, seen, measured_mps, situations
-        )
+    see_vehicles(table, settings, episodes, vehicles, view, seen, measured_mps)
+    path, s_m, ids = vehicles.path, vehicles.s_m, vehicles.id
+    match_vehicles(matches, path, s_m, ids, seen, measured_mps, situations)

@@ -14,6 +14,7 @@ import numpy as np
 
 from risk_dqn_planner.compiled import kernel
 from risk_dqn_planner.situation.situations import Booleans, Floats, Integers
+from sim_bridge.perception.perception import View
 from sim_bridge.perception.visibility import point_hidden
 from sim_bridge.simulation.randomness import (
     PHANTOM_STREAM,
@@ -21,7 +22,7 @@ from sim_bridge.simulation.randomness import (
     random_index,
     random_share,
 )
-from sim_bridge.simulation.settings import Settings
+from sim_bridge.simulation.settings import Sensing, Settings
 from sim_bridge.simulation.state import MOST_IDS, Episodes, Vehicles
 from sim_bridge.world.path_geometry import table_pose
 from sim_bridge.world.world import Lanes, Paths
@@ -55,10 +56,9 @@ def empty_reported(batch: int, vehicles: int, lanes: int) -> Reported:
 
 
 @kernel
-def report_vehicles(
-    vehicles: Vehicles, seen: Booleans, measured_mps: Floats, reported: Reported
-) -> None:
-    """Take over the vehicles, which of them are seen (B, N) and how fast they look (B, N)."""
+def report_vehicles(vehicles: Vehicles, view: View, reported: Reported) -> None:
+    """Take over the vehicles, which of them are seen and how fast they look."""
+    seen, measured_mps = view.seen, view.measured_mps
     count = seen.shape[1]
     reported.id[:, :count] = vehicles.id
     reported.path[:, :count] = vehicles.path
@@ -72,19 +72,15 @@ def report_phantoms(
     paths: Paths,
     lanes: Lanes,
     settings: Settings,
+    sensing: Sensing,
     episodes: Episodes,
-    sensor_x_m: Floats,
-    sensor_y_m: Floats,
-    shadows: Floats,
-    cast: Integers,
+    view: View,
     reported: Reported,
 ) -> None:
-    """Fill the places behind the vehicles with the present phantoms.
-
-    sensor_x_m, sensor_y_m, cast (B,), shadows (B, O, 4, 3): as in View.
-    """
+    """Fill the places behind the vehicles with the present phantoms; the view is of the present."""
+    sensor_x_m, sensor_y_m, shadows, cast = view.x_m, view.y_m, view.shadows, view.cast
     first_path, zone_m, exit_m = lanes.first_path, paths.zone_m, paths.exit_m
-    range_m, lasts = settings.sensor_range_m, settings.sensing.phantom_steps
+    range_m, lasts = settings.sensor_range_m, sensing.phantom_steps
     factor, (slowest_mps, fastest_mps) = (
         settings.draws.overspeed_factor,
         settings.draws.desired_speed_mps,
@@ -98,7 +94,7 @@ def report_phantoms(
             number, i = second * count + lane, first + lane
             draw = number * _DRAWS_PER_PHANTOM
             reported.seen[b, i] = False
-            if random_share(seed, PHANTOM_STREAM, draw) >= settings.sensing.phantom_share:
+            if random_share(seed, PHANTOM_STREAM, draw) >= sensing.phantom_share:
                 continue
             ways = first_path[lane + 1] - first_path[lane]
             p = first_path[lane] + random_index(seed, PHANTOM_STREAM, draw + 1, ways)

@@ -9,7 +9,7 @@ from risk_dqn_planner.compiled import kernel
 from risk_dqn_planner.situation.situations import Booleans, Floats, Integers
 from sim_bridge.perception.perception import View, look, see_vehicles
 from sim_bridge.perception.phantoms import Reported, report_phantoms
-from sim_bridge.simulation.settings import Settings
+from sim_bridge.simulation.settings import Sensing, Settings
 from sim_bridge.simulation.state import Episodes, Vehicles
 from sim_bridge.world.path_geometry import table_pose
 from sim_bridge.world.world import EgoLane, Lanes, Paths
@@ -78,24 +78,15 @@ def reveal_phantoms(
     lanes: Lanes,
     corners: Floats,
     settings: Settings,
+    sensing: Sensing,
     episodes: Episodes,
     view: View,
     reported: Reported,
     poses: VehiclePoses,
 ) -> None:
-    """Fill the poses (B, M) of the phantoms that the sensors report; arguments as in `perceive`."""
+    """Fill the poses (B, M) of the phantoms that the sensors report; corners as in `reveal`."""
     look(ego, corners, settings.sensor_offset_m, episodes, view)
-    report_phantoms(
-        paths,
-        lanes,
-        settings,
-        episodes,
-        view.x_m,
-        view.y_m,
-        view.shadows,
-        view.cast,
-        reported,
-    )
+    report_phantoms(paths, lanes, settings, sensing, episodes, view, reported)
     batch, count = poses.mask.shape
     first = reported.seen.shape[1] - count
     for b in range(batch):

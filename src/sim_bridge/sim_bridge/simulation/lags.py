@@ -7,7 +7,7 @@ import numpy as np
 
 from risk_dqn_planner.compiled import kernel
 from risk_dqn_planner.situation.situations import Booleans, Integers
-from sim_bridge.simulation.settings import NEVER, Settings
+from sim_bridge.simulation.settings import NEVER, Reaction
 from sim_bridge.simulation.state import NO_ACTION, Episodes
 
 UNNOTICED = -1
@@ -27,11 +27,11 @@ class Lags(NamedTuple):
     noticed: Integers
 
 
-def empty_lags(batch: int, vehicles: int, settings: Settings) -> Lags:
+def empty_lags(batch: int, vehicles: int, delay_steps: int, reaction: Reaction) -> Lags:
     """Return the lags of a batch before anything was decided or seen."""
-    drivers = vehicles if settings.reaction.after_steps != NEVER else 0
+    drivers = vehicles if reaction.after_steps != NEVER else 0
     return Lags(
-        given=np.full((batch, settings.delay_steps), NO_ACTION, dtype=np.int64),
+        given=np.full((batch, delay_steps), NO_ACTION, dtype=np.int64),
         in_force=np.full(batch, NO_ACTION, dtype=np.int64),
         noticed=np.full((batch, drivers), UNNOTICED, dtype=np.int64),
     )
@@ -47,10 +47,13 @@ def forget_lags(lags: Lags, mask: Booleans) -> None:
 @kernel
 def take_effect(lags: Lags, episodes: Episodes, actions: Integers) -> None:
     """Put in force what was given D inner steps ago, and keep the actions (B,) given now."""
+    steps = lags.given.shape[1]
     running, tick = episodes.running, episodes.tick
     given, in_force = lags.given, lags.in_force
     for b in range(len(actions)):
-        if running[b]:
-            place = tick[b] % given.shape[1]
+        if steps == 0:
+            in_force[b] = actions[b]
+        elif running[b]:
+            place = tick[b] % steps
             in_force[b] = given[b, place]
             given[b, place] = actions[b]

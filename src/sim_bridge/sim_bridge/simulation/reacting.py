@@ -12,11 +12,11 @@ stated limit. Who is in the zone already goes on.
 import math
 
 from risk_dqn_planner.compiled import kernel
-from risk_dqn_planner.situation.situations import Floats, Integers
+from risk_dqn_planner.situation.situations import Floats
 from sim_bridge.perception.visibility import cast_shadows, point_hidden
-from sim_bridge.simulation.lags import UNNOTICED
-from sim_bridge.simulation.settings import Settings
-from sim_bridge.simulation.state import Episodes, Vehicles
+from sim_bridge.simulation.lags import UNNOTICED, Lags
+from sim_bridge.simulation.settings import Reaction, Settings
+from sim_bridge.simulation.state import SimulationState
 from sim_bridge.simulation.traffic import idm_acceleration
 from sim_bridge.world.path_geometry import table_pose
 from sim_bridge.world.world import EgoLane, Lanes, Paths
@@ -38,19 +38,21 @@ def brake_for_egos(
     lanes: Lanes,
     corners: Floats,
     settings: Settings,
-    episodes: Episodes,
-    vehicles: Vehicles,
-    noticed: Integers,
+    lagging: tuple[Reaction, Lags],
+    state: SimulationState,
     shadows: Floats,
 ) -> None:
     """Let drivers brake who have known of an ego in their way for long enough.
 
-    corners (2, K, 4, 2): catalogue of the obstacles; noticed (B, N) of Lags; shadows
-    (B, O, 4, 3): memory to work in.
+    corners (2, K, 4, 2): catalogue of the obstacles; shadows (B, O, 4, 3): memory to work in.
     """
+    episodes, vehicles, (reaction, lags) = state.episodes, state.vehicles, lagging
+    noticed = lags.noticed
+    if noticed.shape[1] == 0:
+        return
     s_m, speed_mps, path = vehicles.s_m, vehicles.speed_mps, vehicles.path
     desired_mps, acceleration_mps2 = vehicles.desired_speed_mps, vehicles.acceleration_mps2
-    after_steps, hardest_mps2 = settings.reaction.after_steps, settings.reaction.braking_mps2
+    after_steps, hardest_mps2 = reaction.after_steps, reaction.braking_mps2
     batch, count = noticed.shape
     for b in range(batch):
         if not episodes.running[b]:

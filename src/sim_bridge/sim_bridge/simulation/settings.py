@@ -5,7 +5,7 @@ import math
 from typing import NamedTuple
 
 from risk_dqn_planner.vehicle import EgoLimits
-from sim_bridge.scenarios.fields import CarFollowing, Scenario, Traffic
+from sim_bridge.scenarios.fields import CarFollowing, Scenario
 
 NEVER = -1
 # A vehicle that does not exist is reported for so long, then perhaps another one.
@@ -47,16 +47,18 @@ class Draws(NamedTuple):
 
 
 class Reaction(NamedTuple):
-    """How others brake for the ego: how many inner steps after they see it, -1 for never."""
+    """How others brake for the ego: how many inner steps after they see it, -1 for never.
+
+    Not part of Settings, nor is Sensing: what few scenarios use costs the others nothing so.
+    """
 
     after_steps: int
     braking_mps2: float
 
 
 class Sensing(NamedTuple):
-    """How the sensor errs, see `Sensor`; a phantom lasts `phantom_steps` inner steps."""
+    """How the sensor errs, but for noise; a phantom lasts `phantom_steps` inner steps."""
 
-    noise_mps: float
     bias_mps: float
     missed_share: float
     phantom_share: float
@@ -64,22 +66,17 @@ class Sensing(NamedTuple):
 
 
 class Settings(NamedTuple):
-    """All numbers that kernels read; steps are inner steps.
-
-    delay_steps: how much later a decision takes effect.
-    """
+    """The numbers that kernels of all scenarios read; steps are inner steps."""
 
     step_s: float
     decision_steps: int
     limit_steps: int
-    delay_steps: int
     ego: EgoDrive
     idm: Idm
     draws: Draws
-    reaction: Reaction
     sensor_range_m: float
     sensor_offset_m: float
-    sensing: Sensing
+    velocity_noise_mps: float
 
 
 def settings_of(scenario: Scenario, limits: EgoLimits) -> Settings:
@@ -101,7 +98,6 @@ def settings_of(scenario: Scenario, limits: EgoLimits) -> Settings:
         step_s=timing.inner_step_s,
         decision_steps=timing.inner_steps,
         limit_steps=timing.limit_steps,
-        delay_steps=round(scenario.ego.actuation_delay_s / timing.inner_step_s),
         ego=EgoDrive(
             acceleration_mps2=limits.acceleration_mps2,
             braking_mps2=limits.braking_mps2 * scenario.ego.braking_factor,
@@ -110,24 +106,28 @@ def settings_of(scenario: Scenario, limits: EgoLimits) -> Settings:
         ),
         idm=idm_of(traffic.car_following),
         draws=draws,
-        reaction=reaction_of(traffic, timing.inner_step_s),
         sensor_range_m=sensor.range_m,
         sensor_offset_m=sensor.forward_offset_m,
-        sensing=Sensing(
-            noise_mps=sensor.velocity_noise_mps,
-            bias_mps=sensor.velocity_bias_mps,
-            missed_share=sensor.missed_share,
-            phantom_share=sensor.phantom_share,
-            phantom_steps=max(round(PHANTOM_LASTS_S / timing.inner_step_s), 1),
-        ),
+        velocity_noise_mps=sensor.velocity_noise_mps,
     )
 
 
-def reaction_of(traffic: Traffic, step_s: float) -> Reaction:
+def reaction_of(scenario: Scenario) -> Reaction:
     """Flatten how others brake for the ego."""
-    after_s = traffic.brakes_for_ego_after_s
-    after_steps = NEVER if after_s is None else round(after_s / step_s)
-    return Reaction(after_steps, traffic.brakes_for_ego_mps2)
+    after_s = scenario.traffic.brakes_for_ego_after_s
+    after_steps = NEVER if after_s is None else round(after_s / scenario.timing.inner_step_s)
+    return Reaction(after_steps, scenario.traffic.brakes_for_ego_mps2)
+
+
+def sensing_of(scenario: Scenario) -> Sensing:
+    """Flatten how the sensor errs."""
+    sensor = scenario.sensor
+    return Sensing(
+        bias_mps=sensor.velocity_bias_mps,
+        missed_share=sensor.missed_share,
+        phantom_share=sensor.phantom_share,
+        phantom_steps=max(round(PHANTOM_LASTS_S / scenario.timing.inner_step_s), 1),
+    )
 
 
 def idm_of(config: CarFollowing) -> Idm:

@@ -26,6 +26,7 @@ from risk_dqn_planner.situation.situations import (
     empty_situations,
 )
 from risk_dqn_planner.vehicle import EgoLimits
+from sim_bridge.perception.errors import err, perceive_with_errors
 from sim_bridge.perception.perception import empty_view, perceive
 from sim_bridge.perception.phantoms import empty_reported
 from sim_bridge.perception.poses import VehiclePoses, empty_poses, reveal, reveal_phantoms
@@ -33,7 +34,7 @@ from sim_bridge.perception.tracking import Tracker
 from sim_bridge.perception.visible_area import visible_polygon
 from sim_bridge.scenarios.fields import Scenario
 from sim_bridge.simulation.lags import empty_lags, forget_lags
-from sim_bridge.simulation.settings import settings_of
+from sim_bridge.simulation.settings import NEVER, reaction_of, sensing_of, settings_of
 from sim_bridge.simulation.starting import start_episodes
 from sim_bridge.simulation.state import NOBODY, empty_state
 from sim_bridge.simulation.stepping import advance
@@ -113,16 +114,21 @@ class Simulation:
         vehicles = int(scenario.traffic.vehicles.high)
         obstacles = 2 * scenario.obstacles.per_side
         self.state = empty_state(batch, vehicles, obstacles, len(model.lanes))
-        self.lags = empty_lags(batch, vehicles, self.settings)
+        self._reaction, self._sensing = reaction_of(scenario), sensing_of(scenario)
+        delay_steps = round(scenario.ego.actuation_delay_s / scenario.timing.inner_step_s)
+        self._lagging = delay_steps > 0 or self._reaction.after_steps != NEVER
+        self.lags = empty_lags(batch, vehicles, delay_steps, self._reaction)
         self._view = empty_view(batch, vehicles, obstacles)
-        phantoms = len(model.lanes) if scenario.sensor.phantom_share > 0.0 else 0
-        self._reported = empty_reported(batch, vehicles, phantoms)
-        self._pairs = max((vehicles + phantoms) * most_lanes_at_once(self.world.matches), 1)
-        self._looked_along = self.world.lanes.first_path
+        self._phantoms = len(model.lanes) if self._sensing.phantom_share > 0.0 else 0
+        self._erring = any(self._sensing._replace(phantom_steps=0))
+        self._reported = empty_reported(batch, vehicles, self._phantoms)
+        self._pairs = max((vehicles + self._phantoms) * most_lanes_at_once(self.world.matches), 1)
+        self._instantaneous_lanes = self.world.lanes
         self.tracker: Tracker | None = None
         if memory == TRACKED:
             # The memory says how far every lane is free, so nobody else need look along them.
-            self._looked_along = np.zeros(1, dtype=np.int64)
+            nothing = np.zeros(1, dtype=np.int64)
+            self._instantaneous_lanes = self.world.lanes._replace(first_path=nothing)
             config = tracking or TrackingConfig()
             self.tracker = Tracker(self.world, config, scenario.sensor.range_m, batch, self._pairs)
 
@@ -163,7 +169,8 @@ class Simulation:
             np.ascontiguousarray(given.astype(np.uint64)),
             np.ascontiguousarray(chosen.astype(np.bool_)),
         )
-        forget_lags(self.lags, chosen.astype(np.bool_))
+        if self._lagging:
+            forget_lags(self.lags, chosen.astype(np.bool_))
         if self.tracker is not None:
             self.tracker.forget(chosen.astype(np.bool_))
 
@@ -200,8 +207,8 @@ class Simulation:
             world.obstacles.corners,
             self.settings,
             self.state,
+            (self._reaction, self.lags) if self._lagging else None,
             given,
-            self.lags,
             self._view.shadows,
             steps,
         )
@@ -224,9 +231,8 @@ class Simulation:
         world = self.world
         perceive(
             world.ego,
-            world.paths,
-            world.lanes,
-            self._looked_along,
+            world.paths.table,
+            self._instantaneous_lanes,
             world.matches,
             world.sight,
             world.obstacles.corners,
@@ -234,9 +240,21 @@ class Simulation:
             episodes,
             vehicles,
             self._view,
-            self._reported,
             result,
         )
+        if self._erring:
+            perceive_with_errors(
+                world.paths,
+                world.lanes,
+                world.matches,
+                self.settings,
+                self._sensing,
+                episodes,
+                vehicles,
+                self._view,
+                self._reported,
+                result,
+            )
         if self.tracker is not None:
             self.tracker.look(episodes.tick, self.settings.step_s, self._view, result)
         return result
@@ -291,6 +309,8 @@ class Simulation:
             view,
             poses,
         )
+        if self._erring:
+            err(self._sensing, episodes, vehicles, view)
         poses.hidden[:] = vehicles.driving & ~view.seen
         poses.measured_speed_mps[:] = view.measured_mps
         return poses
@@ -298,15 +318,15 @@ class Simulation:
     def phantom_poses(self) -> VehiclePoses:
         """Return the phantoms (B, M), or (B, 0); the mask has those that the sensor reports now."""
         world, reported = self.world, self._reported
-        count = reported.seen.shape[1] - self.state.vehicles.driving.shape[1]
-        poses = empty_poses(self.batch, count)
-        if count > 0:
+        poses = empty_poses(self.batch, self._phantoms)
+        if self._phantoms > 0:
             reveal_phantoms(
                 world.ego,
                 world.paths,
                 world.lanes,
                 world.obstacles.corners,
                 self.settings,
+                self._sensing,
                 self.state.episodes,
                 self._view,
                 reported,

@@ -14,7 +14,7 @@ from sim_bridge.simulation.lags import Lags, take_effect
 from sim_bridge.simulation.population import let_one_in, replace_those_gone
 from sim_bridge.simulation.reacting import brake_for_egos
 from sim_bridge.simulation.right_of_way import Crossings, give_way
-from sim_bridge.simulation.settings import NEVER, Settings
+from sim_bridge.simulation.settings import Reaction, Settings
 from sim_bridge.simulation.state import NO_ACTION, Counts, Episodes, SimulationState, Vehicles
 from sim_bridge.simulation.traffic import (
     find_leaders,
@@ -43,14 +43,16 @@ def advance(
     corners: Floats,
     settings: Settings,
     state: SimulationState,
+    lagging: tuple[Reaction, Lags] | None,
     actions: Integers,
-    lags: Lags,
     shadows: Floats,
     steps: int,
 ) -> None:
     """Take all running episodes `steps` inner steps further under their actions (B,).
 
-    corners (2, K, 4, 2): catalogue of the obstacles; shadows (B, O, 4, 3): memory to work in.
+    corners (2, K, 4, 2): catalogue of the obstacles; lagging: None where neither actions take
+    effect later nor others brake for the ego, which then costs nothing; shadows (B, O, 4, 3):
+    memory to work in.
     """
     episodes, vehicles, counts = state.episodes, state.vehicles, state.counts
     idm, first_zone_m = settings.idm, ego.first_zone_m
@@ -68,24 +70,14 @@ def advance(
             wait_for_others(idm, episodes, vehicles)
         if settings.draws.yielding_share > 0.0:
             yield_to_egos(paths, lanes, idm, episodes, vehicles)
-        if settings.reaction.after_steps != NEVER:
-            brake_for_egos(
-                ego,
-                paths,
-                lanes,
-                corners,
-                settings,
-                episodes,
-                vehicles,
-                lags.noticed,
-                shadows,
-            )
+        if lagging is not None:
+            brake_for_egos(ego, paths, lanes, corners, settings, lagging, state, shadows)
         move_vehicles(
             paths.exit_m, paths.lane, settings.step_s, episodes, vehicles, counts.last_left_s
         )
-        if settings.delay_steps > 0:
-            take_effect(lags, episodes, actions)
-            move_egos(settings, episodes, lags.in_force)
+        if lagging is not None:
+            take_effect(lagging[1], episodes, actions)
+            move_egos(settings, episodes, lagging[1].in_force)
         else:
             move_egos(settings, episodes, actions)
         note_time_gaps(first_zone_m, lanes, paths, settings.step_s, state)

@@ -14,14 +14,14 @@ def poses(hidden: list[bool], present: list[bool]) -> VehiclePoses:
     count = len(hidden)
     ones = np.ones((1, count))
     return VehiclePoses(
-        mask=np.array([present]),
+        mask=np.array([present], dtype=np.bool_),
         id=10 + np.arange(count)[None, :],
         x_m=3.0 * ones,
         y_m=4.0 * ones,
         heading_rad=0.1 * ones,
         speed_mps=6.0 * ones,
         measured_speed_mps=6.5 * ones,
-        hidden=np.array([hidden]),
+        hidden=np.array([hidden], dtype=np.bool_),
     )
 
 

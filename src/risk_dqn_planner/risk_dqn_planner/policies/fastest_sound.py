@@ -58,16 +58,23 @@ class FastestSoundPolicy:
         action = Action.FAST - self._guard.sound(check)[:, ::-1].argmax(axis=1)
         self._guard.decided(check, action)
         vehicle, lane, lacking_s = what_forbids(check, np.minimum(action + 1, Action.FAST))
-        hindered = np.where(vehicle >= 0, Reason.VEHICLE, Reason.HIDDEN_VEHICLE)
-        return Decisions(
-            action=action,
-            q_values=np.full(check.admissible.shape, np.nan),
-            action_risks=np.where(check.admissible, 0.0, 1.0),
-            reason=np.where(lane < 0, Reason.CLEAR, hindered),
-            critical_vehicle=vehicle,
-            critical_lane=lane,
-            lacking_s=lacking_s,
-        )
+        return sound_decisions(check, action, vehicle, lane, lacking_s)
+
+
+def sound_decisions(
+    check: JointCheck, action: Integers, vehicle: Integers, lane: Integers, lacking_s: Floats
+) -> Decisions:
+    """Return decisions for sound actions (B,), and what kept each from being faster (B,)."""
+    hindered = np.where(vehicle >= 0, Reason.VEHICLE, Reason.HIDDEN_VEHICLE)
+    return Decisions(
+        action=action,
+        q_values=np.full(check.admissible.shape, np.nan),
+        action_risks=np.where(check.admissible, 0.0, 1.0),
+        reason=np.where(lane < 0, Reason.CLEAR, hindered),
+        critical_vehicle=vehicle,
+        critical_lane=lane,
+        lacking_s=lacking_s,
+    )
 
 
 def what_forbids(check: JointCheck, action: Integers) -> tuple[Integers, Integers, Floats]:

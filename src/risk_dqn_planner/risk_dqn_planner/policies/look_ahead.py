@@ -13,8 +13,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from risk_dqn_planner.errors import ConfigurationError
-from risk_dqn_planner.policies.base import Action, Decisions, Reason
-from risk_dqn_planner.policies.fastest_sound import assumptions_of, what_forbids
+from risk_dqn_planner.policies.base import Action, Decisions
+from risk_dqn_planner.policies.fastest_sound import assumptions_of, sound_decisions, what_forbids
 from risk_dqn_planner.policies.fingerprint import fingerprint
 from risk_dqn_planner.policies.foresight.search import search_into
 from risk_dqn_planner.policies.foresight.sight import SightLines
@@ -151,16 +151,7 @@ class LookAheadPolicy:
         keeps = (lane < 0) & (action < Action.FAST)
         vehicle = np.where(keeps, critical[:, 0], vehicle)
         lane = np.where(keeps, critical[:, 1], lane)
-        hindered = np.where(vehicle >= 0, Reason.VEHICLE, Reason.HIDDEN_VEHICLE)
-        return Decisions(
-            action=action,
-            q_values=np.full(check.admissible.shape, np.nan),
-            action_risks=np.where(check.admissible, 0.0, 1.0),
-            reason=np.where(lane < 0, Reason.CLEAR, hindered),
-            critical_vehicle=vehicle,
-            critical_lane=lane,
-            lacking_s=lacking_s,
-        )
+        return sound_decisions(check, action, vehicle, lane, lacking_s)
 
     def _fit(self, situations: Situations) -> None:
         """Have room for situations of their shape."""

@@ -160,7 +160,7 @@ def test_while_the_default_policy_is_loaded_the_ego_is_told_to_stop_and_why(
     assert f"ready with policy {DEFAULT_POLICY}" in process.output()
     loading = [d for d in decisions if "still being loaded" in d.text]
     assert loading
-    assert {(d.action, d.reason) for d in loading} == {(Decision.STOP, Decision.NO_SITUATION)}
+    assert {(d.action, d.reason) for d in loading} == {(Decision.STOP, Decision.POLICY_NOT_READY)}
     seen = len(decisions)
     wait_until(lambda: len(decisions) > seen + 1, "decisions", PATIENCE_S, process.check)
     assert decisions[-1].text == "STOP: no situation received yet"

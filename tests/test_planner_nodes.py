@@ -70,7 +70,7 @@ def test_inputs_that_stop_stop_the_ego_within_a_second(planner: PlannerDriver) -
     planner.wait()
     decision = planner.wait()
     assert decision.action == Decision.STOP
-    assert decision.reason in {Decision.STALE_SITUATION, Decision.INVALID_SITUATION}
+    assert decision.reason == Decision.STALE_INPUT
     assert "old" in decision.text
 
 
@@ -85,21 +85,21 @@ def test_a_number_that_is_none_stops_the_ego_and_is_named(planner: PlannerDriver
     broken.twist.twist.linear.x = math.nan
     decision = planner.decide(FREE, odometry=broken)
     assert decision.action == Decision.STOP
-    assert decision.reason == Decision.INVALID_SITUATION
+    assert (decision.reason, decision.faulty_input) == (Decision.NOT_FINITE, Decision.ODOMETRY)
     assert "speed_mps is nan" in decision.text
-    assert planner.situation().status == Situation.INVALID_INPUT
+    assert planner.situation().status == Situation.NOT_FINITE
     assert planner.decide(FREE).action == Decision.FAST
 
 
 def test_inputs_in_another_frame_stop_the_ego(planner: PlannerDriver) -> None:
     decision = planner.decide(replace(FREE, frame="odom"))
-    assert (decision.action, decision.reason) == (Decision.STOP, Decision.INVALID_SITUATION)
+    assert (decision.action, decision.reason) == (Decision.STOP, Decision.WRONG_FRAME)
     assert "'odom'" in decision.text
 
 
 def test_an_ego_beside_its_route_stops(planner: PlannerDriver) -> None:
     decision = planner.decide(replace(FREE, aside_m=8.0))
-    assert (decision.action, decision.reason) == (Decision.STOP, Decision.INVALID_SITUATION)
+    assert (decision.action, decision.reason) == (Decision.STOP, Decision.OFF_ROUTE)
     assert planner.situation().status == Situation.OFF_ROUTE
 
 
@@ -112,7 +112,7 @@ def test_a_route_that_does_not_fit_the_map_stops_the_ego_until_a_better_one_come
     planner: PlannerDriver, route: list[int], complaint: str
 ) -> None:
     planner.send_route(route)
-    decision = decide_until(planner, Decision.INVALID_SITUATION)
+    decision = decide_until(planner, Decision.BAD_ROUTE)
     assert decision.action == Decision.STOP
     assert planner.situation().status == Situation.BAD_ROUTE
     assert complaint in decision.text

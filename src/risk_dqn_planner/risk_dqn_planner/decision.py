@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from risk_dqn_planner.faults import FaultyInput
 from risk_dqn_planner.policies.base import Action, Decisions, Policy, Reason, Supervision
 from risk_dqn_planner.policies.rule_based import RuleBasedConfig
 from risk_dqn_planner.policies.supervised import Supervisor
@@ -27,6 +28,7 @@ class Decision:
     [0, 1], 0 safe, 1 fully unsafe, the negated R_risk of the paper after the action.
     critical_vehicle_id and critical_lane_id name what decided; None where nothing did.
     proposed: the policy's own action where a supervisor checked it, else None.
+    faulty_input: what is at fault where the reason is a fault.
     """
 
     action: Action
@@ -41,6 +43,7 @@ class Decision:
     policy_hash: str
     supervision: Supervision = Supervision.OFF
     proposed: Action | None = None
+    faulty_input: FaultyInput = FaultyInput.NO_INPUT
 
 
 def target_speed(action: Action, ego: EgoLimits) -> float:
@@ -109,7 +112,11 @@ def _supervision(decisions: Decisions, index: int) -> tuple[Supervision, Action 
 
 
 def fault_decision(
-    reason: Reason, text: str, policy_name: str = "", policy_hash: str = ""
+    reason: Reason,
+    text: str,
+    policy_name: str = "",
+    policy_hash: str = "",
+    faulty_input: FaultyInput = FaultyInput.NO_INPUT,
 ) -> Decision:
     """Return Stop for when no policy could be asked; `text` says why."""
     return Decision(
@@ -123,6 +130,7 @@ def fault_decision(
         critical_lane_id=None,
         policy_name=policy_name,
         policy_hash=policy_hash,
+        faulty_input=faulty_input,
     )
 
 

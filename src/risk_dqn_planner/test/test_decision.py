@@ -130,7 +130,7 @@ def test_one_of_a_batch_is_explained(random_situations: Make) -> None:
         assert "\n" not in decision.text
 
 
-@pytest.mark.parametrize("reason", [Reason.NO_SITUATION, Reason.POLICY_FAILED])
+@pytest.mark.parametrize("reason", [Reason.MISSING_INPUT, Reason.POLICY_FAILED])
 def test_a_fault_is_answered_with_stop(reason: Reason) -> None:
     decision = fault_decision(reason, "nothing received yet", "rule_based", "abc")
     assert (decision.action, decision.target_speed_mps) == (Action.STOP, 0.0)

@@ -7,6 +7,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from risk_dqn_planner.faults import Status
 from risk_dqn_planner.situation.situations import Booleans, Floats, Integers, Situations
 
 
@@ -19,7 +20,11 @@ class Action(enum.IntEnum):
 
 
 class Reason(enum.IntEnum):
-    """Why an action was chosen; the codes are those of intersection_msgs/Decision."""
+    """Why an action was chosen; the codes are those of intersection_msgs/Decision.
+
+    Faults are those of Status, with the same names and codes, and the policy's own; with any of
+    them the action is Stop.
+    """
 
     CLEAR = 0  # nothing conflicts
     VEHICLE = 1  # a perceived vehicle decides
@@ -27,10 +32,33 @@ class Reason(enum.IntEnum):
     LEARNED = 3  # highest value of a trained network
     GOAL_REACHED = 4
     FIXED = 5  # the policy decides so whatever the situation
-    NO_SITUATION = 10  # nothing received yet
-    STALE_SITUATION = 11
-    INVALID_SITUATION = 12  # the situation node reports a fault, see the text
-    POLICY_FAILED = 13  # the policy could not be evaluated
+    MISSING_INPUT = Status.MISSING_INPUT.value
+    STALE_INPUT = Status.STALE_INPUT.value
+    FUTURE_INPUT = Status.FUTURE_INPUT.value
+    OUT_OF_ORDER_INPUT = Status.OUT_OF_ORDER_INPUT.value
+    FROZEN_INPUT = Status.FROZEN_INPUT.value
+    WRONG_FRAME = Status.WRONG_FRAME.value
+    NOT_FINITE = Status.NOT_FINITE.value
+    IMPLAUSIBLE_SPEED = Status.IMPLAUSIBLE_SPEED.value
+    IMPLAUSIBLE_JUMP = Status.IMPLAUSIBLE_JUMP.value
+    DUPLICATE_ID = Status.DUPLICATE_ID.value
+    INVALID_VISIBLE_AREA = Status.INVALID_VISIBLE_AREA.value
+    INVALID_SIZE = Status.INVALID_SIZE.value
+    MALFORMED_INPUT = Status.MALFORMED_INPUT.value
+    BAD_ROUTE = Status.BAD_ROUTE.value
+    OFF_ROUTE = Status.OFF_ROUTE.value
+    WRONG_WAY = Status.WRONG_WAY.value
+    RECOVERING = Status.RECOVERING.value
+    NOT_CONFIGURED = Status.NOT_CONFIGURED.value
+    INTERNAL_ERROR = Status.INTERNAL_ERROR.value
+    POLICY_NOT_READY = 60  # it is still being loaded
+    POLICY_REFUSED = 61  # it cannot or must not be used, see the text
+    POLICY_FAILED = 62  # it could not be evaluated
+
+    @property
+    def is_fault(self) -> bool:
+        """Whether no policy could decide; the action then is Stop."""
+        return self >= Reason.MISSING_INPUT
 
 
 class Supervision(enum.IntEnum):

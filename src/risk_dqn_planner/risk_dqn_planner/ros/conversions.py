@@ -25,9 +25,10 @@ from std_msgs.msg import Header
 
 from risk_dqn_planner.decision import Action, Decision, Reason
 from risk_dqn_planner.errors import InputError
+from risk_dqn_planner.faults import FaultyInput, Status
 from risk_dqn_planner.policies.base import Supervision
 from risk_dqn_planner.situation.inputs import EgoPose, ObjectArrays, Perception
-from risk_dqn_planner.situation.report import SituationReport, Status
+from risk_dqn_planner.situation.report import SituationReport
 from risk_dqn_planner.situation.situations import Floats, Situations, empty_situations
 
 SECOND_NS = 1_000_000_000
@@ -57,10 +58,11 @@ def header(stamp_ns: int, frame_id: str = "") -> Header:
     return Header(stamp=to_stamp(stamp_ns), frame_id=frame_id)
 
 
-def check_frame(given: Header, frame_id: str, name: str) -> None:
+def check_frame(given: Header, frame_id: str, source: FaultyInput) -> None:
     """Raise InputError unless a message's coordinates are in the expected frame."""
     if given.frame_id != frame_id:
-        raise InputError(f"{name}: frame is {given.frame_id!r}, expected {frame_id!r}")
+        text = f"{source}: frame is {given.frame_id!r}, expected {frame_id!r}"
+        raise InputError(text, Status.WRONG_FRAME, source)
 
 
 def ego_from_message(message: Odometry, base_to_center_m: float = 0.0) -> EgoPose:
@@ -72,7 +74,9 @@ def ego_from_message(message: Odometry, base_to_center_m: float = 0.0) -> EgoPos
     q = message.pose.pose.orientation
     norm = math.sqrt(q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w)
     if not abs(norm - 1.0) <= _QUATERNION_NORM_TOLERANCE:
-        raise InputError(f"odometry: orientation has norm {norm:g}, expected 1")
+        text = f"odometry: orientation has norm {norm:g}, expected 1"
+        kind = Status.MALFORMED_INPUT if math.isfinite(norm) else Status.NOT_FINITE
+        raise InputError(text, kind, FaultyInput.ODOMETRY)
     heading = math.atan2(
         2.0 * (q.w * q.z + q.x * q.y), q.w * q.w + q.x * q.x - q.y * q.y - q.z * q.z
     )
@@ -159,9 +163,9 @@ def perception_from_messages(
     Raises:
         InputError: one of them is not in the frame, or the orientation is no rotation.
     """
-    check_frame(odometry.header, frame_id, "odometry")
-    check_frame(visible_area.header, frame_id, "visible area")
-    check_frame(objects.header, frame_id, "objects")
+    check_frame(odometry.header, frame_id, FaultyInput.ODOMETRY)
+    check_frame(visible_area.header, frame_id, FaultyInput.VISIBLE_AREA)
+    check_frame(objects.header, frame_id, FaultyInput.OBJECTS)
     age_ns = to_ns(objects.header.stamp) - to_ns(visible_area.header.stamp)
     return Perception(
         ego_from_message(odometry, base_to_center_m),
@@ -186,6 +190,7 @@ def situation_to_message(report: SituationReport, frame_id: str = "map") -> Situ
     message = SituationMessage(
         header=header(report.stamp_ns, frame_id),
         status=int(report.status),
+        faulty_input=int(report.source),
         status_text=report.text,
         route=list(report.route),
     )
@@ -228,16 +233,17 @@ def situation_from_message(message: SituationMessage) -> SituationReport:
     """Return what the situation node reports.
 
     Raises:
-        InputError: unknown status, a number that is not finite, a lane that appears twice or a
-            vehicle on a lane that is not listed.
+        InputError: unknown status or faulty input, a number that is not finite, a lane that
+            appears twice or a vehicle on a lane that is not listed.
     """
     try:
-        status = Status(message.status)
+        status, source = Status(message.status), FaultyInput(message.faulty_input)
     except ValueError as error:
-        raise InputError(f"situation: unknown status {message.status}") from error
+        raise _bad_situation(str(error)) from error
     return SituationReport(
         stamp_ns=to_ns(message.header.stamp),
         status=status,
+        source=source,
         text=message.status_text,
         route=tuple(int(lanelet_id) for lanelet_id in message.route),
         stop_line_derived=message.stop_line_derived,
@@ -249,11 +255,11 @@ def _read_situation(message: SituationMessage) -> Situations:
     lanes, vehicles = message.lanes, message.vehicles
     index = {lane.lane_id: k for k, lane in enumerate(lanes)}
     if len(index) < len(lanes):
-        raise InputError("situation: a lane appears twice")
+        raise _bad_situation("a lane appears twice")
     for vehicle in vehicles:
         if vehicle.lane_id not in index:
-            raise InputError(
-                f"situation: vehicle {vehicle.vehicle_id} is on lane {vehicle.lane_id}, "
+            raise _bad_situation(
+                f"vehicle {vehicle.vehicle_id} is on lane {vehicle.lane_id}, "
                 f"expected one of {sorted(index)}"
             )
     n, m = len(vehicles), len(lanes)
@@ -277,8 +283,12 @@ def _read_situation(message: SituationMessage) -> Situations:
     filled.vehicle_speed_mps[0, :n] = [vehicle.speed_mps for vehicle in vehicles]
     for name, values in zip(filled._fields, filled, strict=True):
         if not np.isfinite(values).all():
-            raise InputError(f"situation: {name} is not finite")
+            raise _bad_situation(f"{name} is not finite", Status.NOT_FINITE)
     return filled
+
+
+def _bad_situation(text: str, kind: Status = Status.MALFORMED_INPUT) -> InputError:
+    return InputError(f"situation: {text}", kind, FaultyInput.SITUATION)
 
 
 def decision_to_message(
@@ -297,6 +307,7 @@ def decision_to_message(
         action=int(decision.action),
         target_speed_mps=float(decision.target_speed_mps),
         reason=int(decision.reason),
+        faulty_input=int(decision.faulty_input),
         text=decision.text,
         q_values=np.asarray(decision.q_values, dtype=np.float64),
         action_risks=np.asarray(decision.action_risks, dtype=np.float64),
@@ -315,17 +326,19 @@ def decision_from_message(message: DecisionMessage) -> Decision:
     """Return the decision; its times stay in the message.
 
     Raises:
-        InputError: unknown action, reason or verdict of the supervisor.
+        InputError: unknown action, reason, faulty input or verdict of the supervisor.
     """
     try:
         action, reason = Action(message.action), Reason(message.reason)
         supervision, proposed = Supervision(message.supervisor), Action(message.proposed)
+        faulty_input = FaultyInput(message.faulty_input)
     except ValueError as error:
         raise InputError(f"decision: {error}") from error
     return Decision(
         action=action,
         target_speed_mps=message.target_speed_mps,
         reason=reason,
+        faulty_input=faulty_input,
         text=message.text,
         q_values=np.array(message.q_values, dtype=np.float64),
         action_risks=np.array(message.action_risks, dtype=np.float64),

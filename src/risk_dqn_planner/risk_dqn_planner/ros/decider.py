@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from risk_dqn_planner.decision import Decision, Reason, fault_decision
+from risk_dqn_planner.faults import FaultyInput
 from risk_dqn_planner.policies.base import Decisions, Policy
 from risk_dqn_planner.situation.report import SituationReport, Status
 from risk_dqn_planner.situation.situations import Situations
@@ -49,7 +50,7 @@ class UnusablePolicy(NamedTuple):
     name: str
     fault: str
     hash: str = ""
-    reason: Reason = Reason.POLICY_FAILED
+    reason: Reason = Reason.POLICY_REFUSED
 
 
 class Choice(NamedTuple):
@@ -101,15 +102,16 @@ class Decider:
     def decide(self, now_ns: int) -> Choice:
         """Return the decision at a time on the clock of the stamps [ns]."""
         if isinstance(self._policy, UnusablePolicy):
-            return self._stop(self._policy.reason, self._policy.fault)
+            return self._stop(self._policy.reason, FaultyInput.POLICY, self._policy.fault)
         report = self._report
         if report is None:
-            return self._stop(Reason.NO_SITUATION, "no situation received yet")
+            text = "no situation received yet"
+            return self._stop(Reason.MISSING_INPUT, FaultyInput.SITUATION, text)
         return self._doubt(report, now_ns) or self._answer(self._policy, report)
 
     def _answer(self, policy: Policy, report: SituationReport) -> Choice:
         if report.situations is None:
-            return self._stop(Reason.INVALID_SITUATION, report.text, report)
+            return self._stop(Reason(report.status), report.source, report.text, report)
         if self._choice is not None and self._repeats(report):
             # Asking again would put the same scene into the policy's history twice.
             return self._choice
@@ -118,7 +120,8 @@ class Decider:
         except Exception as error:  # noqa: BLE001 (a vehicle stops, whatever a policy does)
             self.forget()
             text = f"policy {policy.name} failed: {type(error).__name__}: {error}"
-            return self._stop(Reason.POLICY_FAILED, " ".join(text.split()), report)
+            text = " ".join(text.split())
+            return self._stop(Reason.POLICY_FAILED, FaultyInput.POLICY, text, report)
         self._decided = report
         return self._choice
 
@@ -128,17 +131,17 @@ class Decider:
         limit_s = self._max_age_ns / SECOND_NS
         if now_ns - report.stamp_ns > self._max_age_ns:
             text = f"the situation is {age_s:.2f} s old, expected at most {limit_s:g} s"
-            return self._stop(Reason.STALE_SITUATION, text, report)
+            return self._stop(Reason.STALE_INPUT, FaultyInput.SITUATION, text, report)
         if report.stamp_ns - now_ns > self._max_age_ns:
             text = f"the situation is {-age_s:.2f} s ahead of the clock"
-            return self._stop(Reason.STALE_SITUATION, text, report)
+            return self._stop(Reason.FUTURE_INPUT, FaultyInput.SITUATION, text, report)
         # Faults bear the clock's time, situations that of the objects: only these must rise.
         decided = self._decided if report.status is Status.OK else None
         if decided is not None and report.stamp_ns < decided.stamp_ns:
             back_s = (decided.stamp_ns - report.stamp_ns) / SECOND_NS
             self.forget()
             text = f"the situation went back in time by {back_s:.3f} s"
-            return self._stop(Reason.INVALID_SITUATION, text, report)
+            return self._stop(Reason.OUT_OF_ORDER_INPUT, FaultyInput.SITUATION, text, report)
         return None
 
     def _repeats(self, report: SituationReport) -> bool:
@@ -158,7 +161,13 @@ class Decider:
         decision = self._explain(decisions, situations, 0, policy)
         return Choice(decision, report.stamp_ns)
 
-    def _stop(self, reason: Reason, text: str, report: SituationReport | None = None) -> Choice:
+    def _stop(
+        self,
+        reason: Reason,
+        source: FaultyInput,
+        text: str,
+        report: SituationReport | None = None,
+    ) -> Choice:
         self._interrupted = True
-        decision = fault_decision(reason, text, self._policy.name, self._policy.hash)
+        decision = fault_decision(reason, text, self._policy.name, self._policy.hash, source)
         return Choice(decision, None if report is None else report.stamp_ns)

@@ -28,7 +28,7 @@ from risk_dqn_planner.ros.parameters import (
     declare_assumptions,
 )
 from risk_dqn_planner.ros.qos import NEWEST
-from risk_dqn_planner.situation.report import SituationReport, Status
+from risk_dqn_planner.situation.report import SituationReport
 from risk_dqn_planner.situation.warm_up import example_situation
 
 DIAGNOSTICS_PERIOD_S = 1.0
@@ -82,7 +82,7 @@ class PolicyNode(Node):
         """Stand in for the policy while torch is loaded and the check perhaps compiled."""
         name = self._settings.policy
         text = f"policy {name} is still being loaded"
-        return UnusablePolicy(name, text, reason=Reason.NO_SITUATION)
+        return UnusablePolicy(name, text, reason=Reason.POLICY_NOT_READY)
 
     def _load(self) -> Policy | UnusablePolicy:
         """Load the policy and let it decide twice, so that the first real decision is not late.
@@ -112,7 +112,7 @@ class PolicyNode(Node):
             report = conversions.situation_from_message(message)
         except InputError as error:
             stamp_ns = conversions.to_ns(message.header.stamp)
-            report = SituationReport(stamp_ns, Status.INVALID_INPUT, str(error))
+            report = SituationReport(stamp_ns, error.kind, str(error), source=error.source)
         self._decider.receive(report)
         if self._due_ns is not None and self._decider.has_reached(self._due_ns):
             self._decide_now()
@@ -152,8 +152,8 @@ class PolicyNode(Node):
     def _tell(self, choice: Choice) -> None:
         """Log when decisions begin or cease to be the policy's own, and keep diagnostics."""
         decision = choice.decision
-        faulty = decision.reason >= Reason.NO_SITUATION
-        was_faulty = self._reason is None or self._reason >= Reason.NO_SITUATION
+        faulty = decision.reason.is_fault
+        was_faulty = self._reason is None or self._reason.is_fault
         if faulty and decision.reason is not self._reason:
             self.get_logger().warning(decision.text)
         elif was_faulty and not faulty:
@@ -162,6 +162,7 @@ class PolicyNode(Node):
         values = {
             "action": decision.action.name,
             "reason": decision.reason.name,
+            "faulty_input": decision.faulty_input.name,
             "policy": decision.policy_name,
             "policy_hash": decision.policy_hash,
             "supervisor": decision.supervision.name,

@@ -27,10 +27,10 @@ from risk_dqn_planner.ros.parameters import (
 )
 from risk_dqn_planner.ros.qos import LATCHED, NEWEST
 from risk_dqn_planner.ros.situation_output import SituationOutput
-from risk_dqn_planner.ros.synchroniser import Fault, Frame, Input, Synchroniser, SynchroniserConfig
+from risk_dqn_planner.ros.synchroniser import Frame, Input, Synchroniser, SynchroniserConfig
 from risk_dqn_planner.situation.config import SituationConfig
 from risk_dqn_planner.situation.pipeline import SituationPipeline
-from risk_dqn_planner.situation.report import Status, fault_status
+from risk_dqn_planner.situation.report import Fault, FaultyInput, Status, fault_of
 from risk_dqn_planner.situation.warm_up import example_situation
 
 # Faults are repeated at least at 2 Hz, by simulated and by real time.
@@ -130,11 +130,13 @@ class SituationNode(Node):
             )
             report = self._pipeline.report(frame.stamp_ns, seen)
         except PlannerError as error:
-            self._publish_fault(Fault(frame.stamp_ns, fault_status(error), str(error)))
+            self._publish_fault(fault_of(frame.stamp_ns, error))
         except Exception as error:  # noqa: BLE001 (a vehicle stops, whatever an input does)
             self.get_logger().error(traceback.format_exc(), throttle_duration_sec=10.0)
             text = f"internal error: {error!r}"
-            self._publish_fault(Fault(frame.stamp_ns, Status.INVALID_INPUT, text))
+            self._publish_fault(
+                Fault(frame.stamp_ns, Status.INTERNAL_ERROR, FaultyInput.NO_INPUT, text)
+            )
         else:
             self._output.publish(report)
             model = self._pipeline.model
@@ -143,7 +145,7 @@ class SituationNode(Node):
                 self._marker_publisher.publish(shown)
 
     def _publish_fault(self, fault: Fault) -> None:
-        self._output.publish(self._pipeline.fault(*fault))
+        self._output.publish(self._pipeline.fault(fault))
 
     def _watch(self) -> None:
         """Say what is missing, if nothing has been said for a while."""

@@ -54,7 +54,7 @@ class SituationOutput:
             level, text = freshness(age_s, max_age_s)
             self._diagnostics.set(source.value, level, text, {"age_s": age_s})
         followed = pipeline.model is not None
-        text = "followed" if followed else pipeline.route_fault or "never received"
+        text = "followed" if followed else str(pipeline.route_fault or "never received")
         level = OK if followed else ERROR
         self._diagnostics.set("route", level, text, {"lanelets": pipeline.route})
         self._diagnostics.publish()

@@ -11,7 +11,7 @@ import enum
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from risk_dqn_planner.situation.report import Status
+from risk_dqn_planner.situation.report import Fault, FaultyInput, Status
 from risk_dqn_planner.vehicle import require_positive
 
 SECOND_NS = 1_000_000_000
@@ -23,6 +23,11 @@ class Input(enum.Enum):
     ODOMETRY = "odometry"
     VISIBLE_AREA = "visible area"
     OBJECTS = "objects"
+
+    @property
+    def source(self) -> FaultyInput:
+        """Its name in faults."""
+        return FaultyInput[self.name]
 
 
 @dataclass(frozen=True)
@@ -67,14 +72,6 @@ class Frame(NamedTuple):
     objects: object
 
 
-class Fault(NamedTuple):
-    """Why there is no frame: its time [ns], status and one sentence."""
-
-    stamp_ns: int
-    status: Status
-    text: str
-
-
 class Synchroniser:
     """Holds the newest message of each input and hands out frames."""
 
@@ -92,7 +89,7 @@ class Synchroniser:
         if last is not None and stamp_ns < last.stamp_ns:
             back_s = (last.stamp_ns - stamp_ns) / SECOND_NS
             text = f"{source.value} went back in time by {back_s:.3f} s, expected rising stamps"
-            self._went_back = Fault(stamp_ns, Status.INVALID_INPUT, text)
+            self._went_back = Fault(stamp_ns, Status.OUT_OF_ORDER_INPUT, source.source, text)
         if source is Input.OBJECTS and self._deadline_ns is None:
             # Later lists do not put the deadline off, or a late input would stall everything.
             self._deadline_ns = steady_ns + self._timeout_ns
@@ -140,10 +137,11 @@ class Synchroniser:
             self._deadline_ns = None
 
     def _fault(self, now_ns: int) -> Fault | None:
-        missing = [source.value for source in Input if source not in self._newest]
+        missing = [source for source in Input if source not in self._newest]
         if missing:
-            text = f"no {' and no '.join(missing)} received yet"
-            return Fault(now_ns, Status.MISSING_INPUT, text)
+            names = " and no ".join(source.value for source in missing)
+            text = f"no {names} received yet"
+            return Fault(now_ns, Status.MISSING_INPUT, missing[0].source, text)
         for source in Input:
             age_ns = now_ns - self._newest[source].stamp_ns
             if age_ns > self._max_age_ns:
@@ -151,5 +149,5 @@ class Synchroniser:
                     f"{source.value} is {age_ns / SECOND_NS:.2f} s old, "
                     f"expected at most {self._max_age_ns / SECOND_NS:g} s"
                 )
-                return Fault(now_ns, Status.STALE_INPUT, text)
+                return Fault(now_ns, Status.STALE_INPUT, source.source, text)
         return None

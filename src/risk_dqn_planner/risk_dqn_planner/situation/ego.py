@@ -3,7 +3,7 @@
 
 import math
 
-from risk_dqn_planner.errors import EgoPoseError
+from risk_dqn_planner.errors import EgoPoseError, WrongWayError
 from risk_dqn_planner.intersection.model import IntersectionModel
 from risk_dqn_planner.situation.config import SituationConfig
 from risk_dqn_planner.situation.inputs import EgoPose
@@ -14,7 +14,8 @@ def ego_progress(model: IntersectionModel, ego: EgoPose, config: SituationConfig
     """Return the ego's arc length on its path [m].
 
     Raises:
-        EgoPoseError: the ego is beside its path, before or behind it, or faces the wrong way.
+        EgoPoseError: the ego is beside its path, before it or beyond its end.
+        WrongWayError: it faces the wrong way.
     """
     path = model.ego_path.centerline
     limit = config.max_ego_heading_difference_rad
@@ -36,7 +37,7 @@ def ego_progress(model: IntersectionModel, ego: EgoPose, config: SituationConfig
         heading = nearest.heading_rad
     turned = turned_by_kernel(ego.heading_rad, heading)
     if turned > limit:
-        raise EgoPoseError(
+        raise WrongWayError(
             f"the ego is turned {math.degrees(turned):.0f} degrees away from its route, "
             f"expected at most {math.degrees(limit):.0f}"
         )

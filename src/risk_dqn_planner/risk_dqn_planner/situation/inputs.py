@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from risk_dqn_planner.errors import InputError
+from risk_dqn_planner.faults import FaultyInput, Status
 from risk_dqn_planner.situation.situations import Floats, Integers
 
 # No road vehicle is faster; whatever says so is a broken sensor.
@@ -73,11 +74,11 @@ def check_ego(ego: EgoPose) -> None:
     """Raise InputError unless the ego's pose and speed are finite and plausible."""
     for name, value in zip(ego._fields, ego, strict=True):
         if not math.isfinite(value):
-            raise InputError(f"ego: {name} is {value}, expected a finite number")
+            text = f"ego: {name} is {value}, expected a finite number"
+            raise InputError(text, Status.NOT_FINITE, FaultyInput.ODOMETRY)
     if abs(ego.speed_mps) > MAX_SPEED_MPS:
-        raise InputError(
-            f"ego: speed_mps is {ego.speed_mps:g}, expected at most {MAX_SPEED_MPS:g} in size"
-        )
+        text = f"ego: speed_mps is {ego.speed_mps:g}, expected at most {MAX_SPEED_MPS:g} in size"
+        raise InputError(text, Status.IMPLAUSIBLE_SPEED, FaultyInput.ODOMETRY)
 
 
 def check_objects(objects: ObjectArrays) -> None:
@@ -85,39 +86,45 @@ def check_objects(objects: ObjectArrays) -> None:
     for name, column in zip(objects._fields[1:], objects[1:], strict=True):
         broken = ~np.isfinite(column)
         if broken.any():
-            raise InputError(_complaint(objects, broken, name, "a finite number"))
+            raise _complaint(objects, broken, Status.NOT_FINITE, name, "a finite number")
     too_fast = np.abs(objects.speed_mps) > MAX_SPEED_MPS
     if too_fast.any():
         expected = f"at most {MAX_SPEED_MPS:g} in size"
-        raise InputError(_complaint(objects, too_fast, "speed_mps", expected))
+        raise _complaint(objects, too_fast, Status.IMPLAUSIBLE_SPEED, "speed_mps", expected)
     for name in ("length_m", "width_m"):
         negative = getattr(objects, name) < 0.0
         if negative.any():
-            raise InputError(_complaint(objects, negative, name, "0 or more"))
+            raise _complaint(objects, negative, Status.INVALID_SIZE, name, "0 or more")
     ids, counts = np.unique(objects.id, return_counts=True)
     if (counts > 1).any():
         twice = int(np.argmax(counts > 1))
-        raise InputError(
-            f"objects: id {ids[twice]} appears {counts[twice]} times, expected once at most"
-        )
+        text = f"objects: id {ids[twice]} appears {counts[twice]} times, expected once at most"
+        raise InputError(text, Status.DUPLICATE_ID, FaultyInput.OBJECTS)
 
 
 def check_visible_area(polygon: Floats) -> None:
     """Raise InputError unless a polygon (K, 2) has three points or more, all finite."""
+    where = FaultyInput.VISIBLE_AREA
     if polygon.ndim != 2 or polygon.shape[1] != 2:
-        raise InputError(f"visible area: shape {polygon.shape}, expected (K, 2)")
+        text = f"visible area: shape {polygon.shape}, expected (K, 2)"
+        raise InputError(text, Status.MALFORMED_INPUT, where)
     if len(polygon) < 3:
-        raise InputError(f"visible area: {len(polygon)} points, expected at least 3")
+        text = f"visible area: {len(polygon)} points, expected at least 3"
+        raise InputError(text, Status.INVALID_VISIBLE_AREA, where)
     finite = np.isfinite(polygon).all(axis=1)
     if not finite.all():
         k = int(np.argmin(finite))
-        raise InputError(
+        text = (
             f"visible area: point {k} is ({polygon[k, 0]}, {polygon[k, 1]}), "
             "expected finite numbers"
         )
+        raise InputError(text, Status.NOT_FINITE, where)
 
 
-def _complaint(objects: ObjectArrays, broken: np.ndarray, name: str, expected: str) -> str:
+def _complaint(
+    objects: ObjectArrays, broken: np.ndarray, kind: Status, name: str, expected: str
+) -> InputError:
     index = int(np.argmax(broken))
     value = getattr(objects, name)[index]
-    return f"object {objects.id[index]}: {name} is {value:g}, expected {expected}"
+    text = f"object {objects.id[index]}: {name} is {value:g}, expected {expected}"
+    return InputError(text, kind, FaultyInput.OBJECTS)

@@ -8,7 +8,13 @@ from risk_dqn_planner.intersection.model import IntersectionModel
 from risk_dqn_planner.situation.builder import SituationBuilder
 from risk_dqn_planner.situation.config import SituationConfig
 from risk_dqn_planner.situation.inputs import Perception
-from risk_dqn_planner.situation.report import SituationReport, Status, fault_status
+from risk_dqn_planner.situation.report import (
+    Fault,
+    FaultyInput,
+    SituationReport,
+    Status,
+    fault_of,
+)
 
 Route = tuple[int, ...]
 
@@ -29,7 +35,7 @@ class SituationPipeline:
         self._builders: dict[Route, SituationBuilder] = {}
         self._builder: SituationBuilder | None = None
         self.route: Route = ()
-        self.route_fault = ""
+        self.route_fault: PlannerError | None = None
 
     @property
     def model(self) -> IntersectionModel | None:
@@ -38,13 +44,13 @@ class SituationPipeline:
 
     def select(self, route: Route) -> None:
         """Take a route from now on; one that does not fit the map is reported, not raised."""
-        self.route, self.route_fault, self._builder = route, "", None
+        self.route, self.route_fault, self._builder = route, None, None
         try:
             self._builder = self._builder_of(route)
             if self._builder.memory is not None:
                 self._builder.memory.forget()
         except PlannerError as error:
-            self.route_fault = str(error)
+            self.route_fault = error
 
     def _builder_of(self, route: Route) -> SituationBuilder:
         if route not in self._builders:
@@ -61,7 +67,7 @@ class SituationPipeline:
         try:
             situations = self._builder.build(*seen, time_s=1e-9 * stamp_ns)
         except PlannerError as error:
-            return self.fault(stamp_ns, fault_status(error), str(error))
+            return self.fault(fault_of(stamp_ns, error))
         return SituationReport(
             stamp_ns=stamp_ns,
             status=Status.OK,
@@ -73,10 +79,17 @@ class SituationPipeline:
 
     def route_report(self, stamp_ns: int) -> SituationReport:
         """Return the report for as long as there is no usable route."""
-        if self.route_fault:
-            return self.fault(stamp_ns, Status.BAD_ROUTE, self.route_fault)
-        return self.fault(stamp_ns, Status.MISSING_INPUT, "no route received yet")
+        if self.route_fault is not None:
+            return self.fault(fault_of(stamp_ns, self.route_fault))
+        text = "no route received yet"
+        return self.fault(Fault(stamp_ns, Status.MISSING_INPUT, FaultyInput.ROUTE, text))
 
-    def fault(self, stamp_ns: int, status: Status, text: str) -> SituationReport:
+    def fault(self, fault: Fault) -> SituationReport:
         """Return a report without a situation."""
-        return SituationReport(stamp_ns=stamp_ns, status=status, text=text, route=self.route)
+        return SituationReport(
+            stamp_ns=fault.stamp_ns,
+            status=fault.status,
+            source=fault.source,
+            text=fault.text,
+            route=self.route,
+        )

@@ -3,6 +3,7 @@
 
 import math
 from dataclasses import replace
+from enum import IntEnum
 
 import numpy as np
 import pytest
@@ -19,7 +20,7 @@ from risk_dqn_planner.errors import InputError
 from risk_dqn_planner.policies.base import Supervision
 from risk_dqn_planner.ros import conversions
 from risk_dqn_planner.situation.inputs import EgoPose, object_arrays
-from risk_dqn_planner.situation.report import SituationReport, Status
+from risk_dqn_planner.situation.report import FaultyInput, SituationReport, Status
 from risk_dqn_planner.situation.warm_up import example_situation, square
 
 STAMP_NS = 1_234_567_890_123
@@ -121,6 +122,17 @@ def test_a_message_in_another_frame_is_refused() -> None:
         conversions.perception_from_messages(odometry, area, objects, "map", 0.0)
 
 
+def test_a_fault_of_a_message_names_its_kind_and_the_input() -> None:
+    odometry = conversions.ego_to_message(EgoPose(0.0, 0.0, 0.0, 0.0), STAMP_NS, "odom")
+    with pytest.raises(InputError) as caught:
+        conversions.check_frame(odometry.header, "map", FaultyInput.ODOMETRY)
+    assert (caught.value.kind, caught.value.source) == (Status.WRONG_FRAME, FaultyInput.ODOMETRY)
+    odometry.pose.pose.orientation.w = math.nan
+    with pytest.raises(InputError) as caught:
+        conversions.ego_from_message(odometry)
+    assert (caught.value.kind, caught.value.source) == (Status.NOT_FINITE, FaultyInput.ODOMETRY)
+
+
 def test_an_older_visible_area_is_known_to_be_older() -> None:
     odometry = conversions.ego_to_message(EgoPose(1.0, 2.0, 0.3, 4.0), STAMP_NS)
     objects = conversions.objects_to_message(object_arrays(), STAMP_NS)
@@ -159,20 +171,43 @@ def test_a_situation_names_lanes_and_vehicles_by_id() -> None:
 
 
 def test_a_fault_survives_without_a_situation() -> None:
-    fault = SituationReport(STAMP_NS, Status.OFF_ROUTE, "the ego is 3.0 m beside its route", (4,))
+    fault = SituationReport(
+        STAMP_NS, Status.OFF_ROUTE, "3.0 m beside", (4,), source=FaultyInput.ODOMETRY
+    )
     message = conversions.situation_to_message(fault)
     assert over_the_wire(fault) == fault
     assert (len(message.lanes), len(message.vehicles)) == (0, 0)
 
 
-def test_every_status_has_the_code_of_the_message() -> None:
-    for status in Status:
-        assert getattr(SituationMessage, status.name) == status
+SUPERVISOR = {f"SUPERVISOR_{verdict.name}": int(verdict) for verdict in Supervision}
 
 
-def test_actions_and_reasons_have_the_codes_of_the_message() -> None:
-    for name in (*Action, *Reason):
-        assert getattr(DecisionMessage, name.name) == name
+def codes(*enums: type[IntEnum]) -> dict[str, int]:
+    return {member.name: int(member) for each in enums for member in each}
+
+
+def constants(message: type) -> dict[str, int]:
+    """What a message defines: class attributes in capitals are constants."""
+    names = [name for name in dir(type(message)) if name.isupper() and not name.startswith("_")]
+    return {name: getattr(message, name) for name in names}
+
+
+def test_the_codes_of_situations_are_those_of_the_message() -> None:
+    assert constants(SituationMessage) == codes(Status, FaultyInput)
+
+
+def test_the_codes_of_decisions_are_those_of_the_message() -> None:
+    found = constants(DecisionMessage)
+    expected = codes(Action, Reason, FaultyInput) | SUPERVISOR | {"NO_ID": DecisionMessage.NO_ID}
+    assert found == expected
+
+
+def test_every_fault_of_a_situation_is_a_reason_to_stop_with_the_same_name_and_code() -> None:
+    faults = {status.name: int(status) for status in Status if status is not Status.OK}
+    reasons = {reason.name: int(reason) for reason in Reason if reason.is_fault}
+    own = {name: code for name, code in reasons.items() if name.startswith("POLICY_")}
+    assert reasons == faults | own
+    assert sorted(own) == ["POLICY_FAILED", "POLICY_NOT_READY", "POLICY_REFUSED"]
 
 
 def test_a_situation_with_a_number_that_is_not_finite_is_refused() -> None:
@@ -197,7 +232,7 @@ def test_a_lane_that_appears_twice_is_refused() -> None:
 
 
 def test_an_unknown_status_is_refused() -> None:
-    with pytest.raises(InputError, match="unknown status 77"):
+    with pytest.raises(InputError, match="situation: 77 is not a valid Status"):
         conversions.situation_from_message(SituationMessage(status=77))
 
 
@@ -240,6 +275,14 @@ def test_an_action_that_nobody_checked_is_the_proposed_one() -> None:
 def test_an_unknown_verdict_is_refused() -> None:
     with pytest.raises(InputError, match="decision: 7 is not a valid Supervision"):
         conversions.decision_from_message(DecisionMessage(supervisor=7))
+
+
+def test_what_is_at_fault_survives_the_way_over_the_wire() -> None:
+    fault = replace(DECISION, reason=Reason.STALE_INPUT, faulty_input=FaultyInput.VISIBLE_AREA)
+    message = conversions.decision_to_message(fault, STAMP_NS)
+    received = deserialize_message(serialize_message(message), DecisionMessage)
+    assert received.faulty_input == DecisionMessage.VISIBLE_AREA
+    assert conversions.decision_from_message(received).faulty_input is FaultyInput.VISIBLE_AREA
 
 
 def test_a_decision_without_a_situation_has_a_negative_age() -> None:

@@ -12,7 +12,7 @@ from risk_dqn_planner.policies.base import Decisions, Policy
 from risk_dqn_planner.policies.constant import ConstantPolicy
 from risk_dqn_planner.policies.supervised import Supervisor
 from risk_dqn_planner.ros.decider import Choice, Decider, DeciderConfig, UnusablePolicy
-from risk_dqn_planner.situation.report import SituationReport, Status
+from risk_dqn_planner.situation.report import FaultyInput, SituationReport, Status
 from risk_dqn_planner.situation.situations import Booleans, Situations
 from risk_dqn_planner.situation.warm_up import example_situation
 
@@ -64,13 +64,14 @@ def decide_at(node: Decider, now_ms: int, given: SituationReport | None = None) 
 
 def reason(choice: Choice) -> Reason:
     stopped = choice.decision.action is Action.STOP
-    assert stopped == (choice.decision.reason >= Reason.NO_SITUATION)
+    assert stopped == choice.decision.reason.is_fault
     return choice.decision.reason
 
 
 def test_before_any_situation_the_decision_is_stop() -> None:
     choice = decide_at(decider(Recorder()), 0)
-    assert reason(choice) is Reason.NO_SITUATION
+    assert reason(choice) is Reason.MISSING_INPUT
+    assert choice.decision.faulty_input is FaultyInput.SITUATION
     assert choice.decision.text == "STOP: no situation received yet"
     assert choice.decision.target_speed_mps == 0.0
     assert choice.decision.policy_name == "recorder"
@@ -87,29 +88,31 @@ def test_a_situation_of_exactly_the_allowed_age_is_used_and_an_older_one_is_not(
     node = decider(Recorder())
     assert decide_at(node, 1500, report(1000)).decision.action is Action.FAST
     choice = decide_at(node, 1501)
-    assert reason(choice) is Reason.STALE_SITUATION
+    assert reason(choice) is Reason.STALE_INPUT
     assert choice.decision.text == "STOP: the situation is 0.50 s old, expected at most 0.5 s"
     assert choice.situation_stamp_ns == 1000 * MS
 
 
 def test_a_situation_far_ahead_of_the_clock_is_not_used() -> None:
     choice = decide_at(decider(Recorder()), 1000, report(9000))
-    assert reason(choice) is Reason.STALE_SITUATION
+    assert reason(choice) is Reason.FUTURE_INPUT
     assert "8.00 s ahead of the clock" in choice.decision.text
 
 
 @pytest.mark.parametrize("status", [status for status in Status if status is not Status.OK])
 def test_a_fault_is_passed_on_in_its_own_words(status: Status) -> None:
-    fault = SituationReport(1000 * MS, status, "the ego is 9.0 m beside its route")
+    text = "the ego is 9.0 m beside its route"
+    fault = SituationReport(1000 * MS, status, text, source=FaultyInput.ODOMETRY)
     choice = decide_at(decider(Recorder()), 1000, fault)
-    assert reason(choice) is Reason.INVALID_SITUATION
+    assert (reason(choice).name, int(reason(choice))) == (status.name, int(status))
+    assert choice.decision.faulty_input is FaultyInput.ODOMETRY
     assert choice.decision.text == "STOP: the ego is 9.0 m beside its route"
 
 
 def test_it_recovers_when_situations_come_back() -> None:
     node = decider(Recorder())
     decide_at(node, 500, report(500))
-    assert reason(decide_at(node, 9000)) is Reason.STALE_SITUATION
+    assert reason(decide_at(node, 9000)) is Reason.STALE_INPUT
     assert decide_at(node, 9500, report(9500)).decision.action is Action.FAST
 
 
@@ -138,7 +141,7 @@ def test_history_goes_on_over_a_fault_shorter_than_the_gap() -> None:
     policy = Recorder()
     node = decider(policy)
     decide_at(node, 0, report(0))
-    decide_at(node, 500, SituationReport(500 * MS, Status.INVALID_INPUT, "odd"))
+    decide_at(node, 500, SituationReport(500 * MS, Status.MALFORMED_INPUT, "odd"))
     decide_at(node, 700, report(700))
     assert policy.restarts == [True, False]
 
@@ -156,7 +159,7 @@ def test_a_situation_that_goes_back_in_time_is_a_fault_once_and_then_the_new_tim
     node = decider(policy)
     decide_at(node, 1000, report(1000))
     choice = decide_at(node, 1000, report(900))
-    assert reason(choice) is Reason.INVALID_SITUATION
+    assert reason(choice) is Reason.OUT_OF_ORDER_INPUT
     assert "went back in time by 0.100 s" in choice.decision.text
     assert decide_at(node, 1000, report(950)).decision.action is Action.FAST
     assert policy.restarts == [True, True]
@@ -196,17 +199,18 @@ def test_a_policy_that_could_not_be_loaded_stops_the_vehicle_whatever_arrives() 
     node = decider(UnusablePolicy("net.pt", "net.pt does not exist"))
     for given in (None, report(1000)):
         choice = decide_at(node, 1000, given)
-        assert reason(choice) is Reason.POLICY_FAILED
+        assert reason(choice) is Reason.POLICY_REFUSED
+        assert choice.decision.faulty_input is FaultyInput.POLICY
         assert choice.decision.text == "STOP: net.pt does not exist"
         assert choice.decision.policy_name == "net.pt"
 
 
 def test_a_policy_that_is_not_loaded_yet_stops_the_vehicle_and_says_so() -> None:
     text = "policy net.pt is still being loaded"
-    node = decider(UnusablePolicy("net.pt", text, reason=Reason.NO_SITUATION))
+    node = decider(UnusablePolicy("net.pt", text, reason=Reason.POLICY_NOT_READY))
     choice = decide_at(node, 1000, report(1000))
     assert choice.decision.action is Action.STOP
-    assert reason(choice) is Reason.NO_SITUATION
+    assert reason(choice) is Reason.POLICY_NOT_READY
     assert choice.decision.text == f"STOP: {text}"
 
 
@@ -215,7 +219,7 @@ def test_after_a_stop_of_another_s_a_supervisor_s_memory_is_void(supervised: boo
     policy = Recorder()
     node = Decider(policy, explain, DeciderConfig(), restart_after_fault=supervised)
     decide_at(node, 0, report(0))
-    decide_at(node, 500, SituationReport(500 * MS, Status.INVALID_INPUT, "odd"))
+    decide_at(node, 500, SituationReport(500 * MS, Status.MALFORMED_INPUT, "odd"))
     decide_at(node, 700, report(700))
     decide_at(node, 1200, report(1200))
     assert policy.restarts == [True, supervised, False]

@@ -4,8 +4,8 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from risk_dqn_planner.ros.synchroniser import Fault, Frame, Input, Synchroniser, SynchroniserConfig
-from risk_dqn_planner.situation.report import Status
+from risk_dqn_planner.ros.synchroniser import Frame, Input, Synchroniser, SynchroniserConfig
+from risk_dqn_planner.situation.report import Fault, FaultyInput, Status
 
 MS = 1_000_000
 ODOMETRY, AREA, OBJECTS = Input.ODOMETRY, Input.VISIBLE_AREA, Input.OBJECTS
@@ -83,7 +83,10 @@ def test_an_input_of_exactly_the_allowed_age_serves_and_an_older_one_is_a_fault(
     assert take(sync, steady_ms=50) == frame(1000, 1000, 500)
     give(sync, OBJECTS, 1010, steady_ms=60)
     assert take(sync, steady_ms=110) == Fault(
-        1010 * MS, Status.STALE_INPUT, "visible area is 0.51 s old, expected at most 0.5 s"
+        1010 * MS,
+        Status.STALE_INPUT,
+        FaultyInput.VISIBLE_AREA,
+        "visible area is 0.51 s old, expected at most 0.5 s",
     )
 
 
@@ -91,7 +94,10 @@ def test_what_never_came_is_named() -> None:
     sync = synchroniser()
     give(sync, OBJECTS, 100)
     assert take(sync, steady_ms=50) == Fault(
-        100 * MS, Status.MISSING_INPUT, "no odometry and no visible area received yet"
+        100 * MS,
+        Status.MISSING_INPUT,
+        FaultyInput.ODOMETRY,
+        "no odometry and no visible area received yet",
     )
 
 
@@ -103,7 +109,8 @@ def test_stamps_that_fall_are_a_fault_once_and_then_the_new_time_counts() -> Non
     give(sync, OBJECTS, 900)
     assert take(sync) == Fault(
         900 * MS,
-        Status.INVALID_INPUT,
+        Status.OUT_OF_ORDER_INPUT,
+        FaultyInput.OBJECTS,
         "objects went back in time by 0.100 s, expected rising stamps",
     )
     give(sync, OBJECTS, 950)
@@ -132,13 +139,19 @@ def test_a_repeated_stamp_is_in_order() -> None:
 def test_inputs_that_have_stopped_are_overdue_by_the_clock_of_the_stamps() -> None:
     sync = synchroniser()
     assert sync.overdue(0) == Fault(
-        0, Status.MISSING_INPUT, "no odometry and no visible area and no objects received yet"
+        0,
+        Status.MISSING_INPUT,
+        FaultyInput.ODOMETRY,
+        "no odometry and no visible area and no objects received yet",
     )
     for source in (ODOMETRY, AREA, OBJECTS):
         give(sync, source, 1000)
     assert sync.overdue(1500 * MS) is None
     assert sync.overdue(1501 * MS) == Fault(
-        1501 * MS, Status.STALE_INPUT, "odometry is 0.50 s old, expected at most 0.5 s"
+        1501 * MS,
+        Status.STALE_INPUT,
+        FaultyInput.ODOMETRY,
+        "odometry is 0.50 s old, expected at most 0.5 s",
     )
 
 

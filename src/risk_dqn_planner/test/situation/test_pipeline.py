@@ -10,12 +10,13 @@ from risk_dqn_planner.errors import (
     MapError,
     NoConflictError,
     PlannerError,
+    WrongWayError,
 )
 from risk_dqn_planner.intersection.model import IntersectionModel
 from risk_dqn_planner.situation.config import SituationConfig
 from risk_dqn_planner.situation.inputs import EgoPose, Perception, object_arrays
 from risk_dqn_planner.situation.pipeline import SituationPipeline
-from risk_dqn_planner.situation.report import Status, fault_status
+from risk_dqn_planner.situation.report import Fault, FaultyInput, Status, fault_of
 from risk_dqn_planner.situation.warm_up import crossing_model, square
 
 ON_ROUTE = EgoPose(-20.0, 0.0, 0.0, 4.0)
@@ -41,6 +42,7 @@ class Maker:
 def test_without_a_route_one_is_missing() -> None:
     report = SituationPipeline(Maker()).report(5, perception())
     assert (report.stamp_ns, report.status) == (5, Status.MISSING_INPUT)
+    assert report.source is FaultyInput.ROUTE
     assert report.text == "no route received yet"
     assert report.situations is None
 
@@ -71,8 +73,10 @@ def test_a_route_that_comes_back_is_not_built_again() -> None:
     ("seen", "status", "words"),
     [
         (perception(EgoPose(-20.0, 9.0, 0.0, 4.0)), Status.OFF_ROUTE, "9.0 m beside"),
-        (perception(EgoPose(float("nan"), 0.0, 0.0, 4.0)), Status.INVALID_INPUT, "x_m is nan"),
-        (perception(rows=((0.0, 0.0, 0.0, float("inf")),)), Status.INVALID_INPUT, "object 1"),
+        (perception(EgoPose(-20.0, 0.0, 3.0, 4.0)), Status.WRONG_WAY, "turned 172 degrees"),
+        (perception(EgoPose(float("nan"), 0.0, 0.0, 4.0)), Status.NOT_FINITE, "x_m is nan"),
+        (perception(rows=((0.0, 0.0, 0.0, float("inf")),)), Status.NOT_FINITE, "object 1"),
+        (perception(rows=((0.0, 0.0, 0.0, 150.0),)), Status.IMPLAUSIBLE_SPEED, "object 1"),
     ],
 )
 def test_a_fault_of_the_input_becomes_its_status(
@@ -87,20 +91,25 @@ def test_a_fault_of_the_input_becomes_its_status(
 
 
 @pytest.mark.parametrize(
-    ("error", "status"),
+    ("error", "status", "source"),
     [
-        (InputError("x"), Status.INVALID_INPUT),
-        (EgoPoseError("x"), Status.OFF_ROUTE),
-        (NoConflictError("x"), Status.BAD_ROUTE),
+        (EgoPoseError("x"), Status.OFF_ROUTE, FaultyInput.ODOMETRY),
+        (WrongWayError("x"), Status.WRONG_WAY, FaultyInput.ODOMETRY),
+        (NoConflictError("x"), Status.BAD_ROUTE, FaultyInput.ROUTE),
+        (MapError("x"), Status.NOT_CONFIGURED, FaultyInput.MAP),
+        (InputError("x", source=FaultyInput.OBJECTS), Status.MALFORMED_INPUT, FaultyInput.OBJECTS),
+        (
+            InputError("x", Status.WRONG_FRAME, FaultyInput.ODOMETRY),
+            Status.WRONG_FRAME,
+            FaultyInput.ODOMETRY,
+        ),
     ],
+    ids=lambda value: getattr(value, "name", type(value).__name__),
 )
-def test_each_kind_of_error_has_its_status(error: PlannerError, status: Status) -> None:
-    assert fault_status(error) is status
-
-
-def test_an_error_that_no_input_can_cause_is_not_swallowed() -> None:
-    with pytest.raises(MapError):
-        fault_status(MapError("x"))
+def test_every_error_names_its_fault(
+    error: PlannerError, status: Status, source: FaultyInput
+) -> None:
+    assert fault_of(7, error) == Fault(7, status, source, "x")
 
 
 SECOND_NS = 1_000_000_000

@@ -61,6 +61,13 @@ class Mailbox(Generic[Message]):
             return self._stamp_ns, self._message
 
 
+def _has_heard(decision: Decision) -> bool:
+    """Whether the policy is there and knows what the situation node says."""
+    return bool(
+        decision.reason != Decision.POLICY_NOT_READY and decision.faulty_input != Decision.SITUATION
+    )
+
+
 class PlannerLink:
     """Gives the planner its time and collects its answers."""
 
@@ -108,7 +115,7 @@ class PlannerLink:
             self._met_ns += DECISION_PERIOD_NS
             self.tick(self._met_ns)
             decision = self.decisions.wait(self._met_ns, _FIRST_ANSWER_S)
-            if decision is not None and decision.reason != Decision.NO_SITUATION:
+            if decision is not None and _has_heard(decision):
                 return (self._met_ns + EPISODE_GAP_NS) // _START_NS * _START_NS + _START_NS
         return None
 

@@ -20,7 +20,7 @@ ROS_MODULES = {
 }  # fmt: skip
 
 # A room may import from itself and from what stands before it.
-FOUNDATION = ("faults", "errors", "compiled_cache", "compiled", "vehicle", "geometry")
+FOUNDATION = ("faults", "errors", "compiled_cache", "compiled", "settled", "vehicle", "geometry")
 ROOMS = (
     *FOUNDATION, "map", "intersection", "situation", "risk", "safety", "state", "policies",
     "decision",

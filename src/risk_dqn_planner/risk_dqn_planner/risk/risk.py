@@ -69,9 +69,9 @@ def assess(situations: Situations, config: RiskConfig, include_hidden: bool) -> 
     result = RiskAssessment(
         vehicle_reward=np.zeros((batch, vehicles)),
         lane_reward=np.zeros(situations.lane_mask.shape),
-        total=np.zeros(batch),
-        critical_vehicle=np.full(batch, NOTHING),
-        critical_lane=np.full(batch, NOTHING),
+        total=np.empty(batch),
+        critical_vehicle=np.empty(batch, dtype=np.int64),
+        critical_lane=np.empty(batch, dtype=np.int64),
     )
     assess_into(situations, config.parameters(), include_hidden, result)
     return result

@@ -7,6 +7,7 @@ import numpy as np
 
 from risk_dqn_planner.compiled import kernel
 from risk_dqn_planner.errors import InputError
+from risk_dqn_planner.settled import Settled
 from risk_dqn_planner.situation.situations import Booleans, Floats, Integers, Situations
 from risk_dqn_planner.state.encoding import (
     COLUMNS,
@@ -58,6 +59,7 @@ class StateEncoder:
         self._parameters = self.config.parameters()
         self._head = 0
         self._columns = COLUMNS if self.config.stacked else 1
+        self._encode = Settled(encode_into)
         self._memory = _new_memory(0, 0, 0, self._columns)
 
     def encode(
@@ -80,7 +82,7 @@ class StateEncoder:
         if not out.flags.c_contiguous:
             raise InputError(f"out has strides {out.strides}, expected an array without gaps")
         self._head = (self._head + 1) % SCENES
-        encode_into(situations, restart, self._parameters, self._head, self._memory, out)
+        self._encode(situations, restart, self._parameters, self._head, self._memory, out)
         return out
 
     def _make_room(self, situations: Situations, restart: Booleans) -> None:

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from risk_dqn_planner.decision import Action
 from risk_dqn_planner.errors import ConfigurationError
 from risk_dqn_planner.intersection.model import IntersectionModel
+from risk_dqn_planner.settled import Settled
 from risk_dqn_planner.situation.config import (
     INSTANTANEOUS,
     TRACKED,
@@ -37,7 +38,7 @@ from sim_bridge.simulation.lags import empty_lags, forget_lags
 from sim_bridge.simulation.settings import NEVER, reaction_of, sensing_of, settings_of
 from sim_bridge.simulation.starting import start_episodes
 from sim_bridge.simulation.state import NOBODY, empty_state
-from sim_bridge.simulation.stepping import advance
+from sim_bridge.simulation.stepping import advance, are_actions
 from sim_bridge.world.matches import most_lanes_at_once
 from sim_bridge.world.path_geometry import table_pose
 from sim_bridge.world.world import build_world
@@ -124,6 +125,8 @@ class Simulation:
         self._reported = empty_reported(batch, vehicles, self._phantoms)
         self._pairs = max((vehicles + self._phantoms) * most_lanes_at_once(self.world.matches), 1)
         self._instantaneous_lanes = self.world.lanes
+        self._start, self._go_on = Settled(start_episodes), Settled(advance)
+        self._perceive = Settled(perceive)
         self.tracker: Tracker | None = None
         if memory == TRACKED:
             # The memory says how far every lane is free, so nobody else need look along them.
@@ -158,7 +161,7 @@ class Simulation:
                     f"{name} has shape {array.shape}, expected ({self.batch},)"
                 )
         world = self.world
-        start_episodes(
+        self._start(
             world.ego.stop_line_m,
             world.paths,
             world.lanes,
@@ -190,14 +193,14 @@ class Simulation:
         given = np.ascontiguousarray(actions, dtype=np.int64)
         if given.shape != (self.batch,):
             raise ConfigurationError(f"actions has shape {given.shape}, expected ({self.batch},)")
-        if given.min() < min(Action) or given.max() > max(Action):
+        if not are_actions(given):
             raise ConfigurationError(
                 f"actions range from {given.min()} to {given.max()}, expected 0 to {max(Action)}"
             )
         episodes = self.state.episodes
         ran = episodes.running.copy()
         world = self.world
-        advance(
+        self._go_on(
             world.ego,
             world.paths,
             world.lanes,
@@ -229,7 +232,7 @@ class Simulation:
         result = out if out is not None else self._empty_situations()
         episodes, vehicles, _ = self.state
         world = self.world
-        perceive(
+        self._perceive(
             world.ego,
             world.paths.table,
             self._instantaneous_lanes,

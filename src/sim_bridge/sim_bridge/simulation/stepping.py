@@ -7,6 +7,7 @@ An episode that has ended stays as it is.
 import math
 
 from risk_dqn_planner.compiled import kernel
+from risk_dqn_planner.decision import Action
 from risk_dqn_planner.geometry.footprint import footprints_overlap
 from risk_dqn_planner.situation.situations import Floats, Integers
 from sim_bridge.simulation.dynamics import accelerate, follow_target, target_speed
@@ -30,6 +31,16 @@ from sim_bridge.world.world import EgoLane, Lanes, Paths
 # A decision step that takes more than this off the ego's speed counts as hard braking.
 _HARD_BRAKE_MPS = 1.0
 _STANDING_MPS = 0.1
+_ACTIONS = len(Action)
+
+
+@kernel
+def are_actions(values: Integers) -> bool:
+    """Tell whether values (B,) are actions, all of them."""
+    wrong = 0
+    for value in values:
+        wrong += (value < 0) | (value >= _ACTIONS)
+    return wrong == 0
 
 
 @kernel

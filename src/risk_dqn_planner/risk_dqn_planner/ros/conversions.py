@@ -6,7 +6,8 @@ it anyway (ego, objects, visible area), there. A violation raises InputError.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 from builtin_interfaces.msg import Duration, Time
@@ -154,14 +155,15 @@ def area_to_message(corners: Floats, stamp_ns: int, frame_id: str = "map") -> Po
 def perception_from_messages(
     odometry: Odometry,
     visible_area: PolygonStamped,
-    objects: PerceivedObjects,
+    objects: Any,  # noqa: ANN401 (of whichever stack)
     frame_id: str,
     base_to_center_m: float,
+    objects_of: Callable[[Any], ObjectArrays] = objects_from_message,
 ) -> Perception:
-    """Return what three messages say together.
+    """Return what three messages say together; `objects_of` reads the objects' message.
 
     Raises:
-        InputError: one of them is not in the frame, or the orientation is no rotation.
+        InputError: one of them is not in the frame, or an orientation is no rotation.
     """
     check_frame(odometry.header, frame_id, FaultyInput.ODOMETRY)
     check_frame(visible_area.header, frame_id, FaultyInput.VISIBLE_AREA)
@@ -169,7 +171,7 @@ def perception_from_messages(
     age_ns = to_ns(objects.header.stamp) - to_ns(visible_area.header.stamp)
     return Perception(
         ego_from_message(odometry, base_to_center_m),
-        objects_from_message(objects),
+        objects_of(objects),
         polygon_from_message(visible_area.polygon),
         1e-9 * age_ns,
     )

@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import Any
 
 from geometry_msgs.msg import PolygonStamped
-from intersection_msgs.msg import PerceivedObjects, Route
+from intersection_msgs.msg import Route
 from nav_msgs.msg import Odometry
 from rclpy.node import Node
 from visualization_msgs.msg import MarkerArray
@@ -17,6 +17,7 @@ from risk_dqn_planner.errors import PlannerError
 from risk_dqn_planner.intersection.builder import build_intersection
 from risk_dqn_planner.intersection.config import IntersectionConfig
 from risk_dqn_planner.ros import conversions, markers
+from risk_dqn_planner.ros.adapters.kinds import ObjectsAdapter
 from risk_dqn_planner.ros.clock import is_simulated, now_ns, on_clock_back, steady_timer
 from risk_dqn_planner.ros.main import run
 from risk_dqn_planner.ros.parameters import (
@@ -46,6 +47,7 @@ class SituationNode(Node):
         super().__init__("situation")
         self._map = declare(self, MapParameters)
         self._ego = declare(self, EgoParameters)
+        self._objects = declare(self, ObjectsAdapter)
         self._sync_config = self._declare_synchroniser()
         self._synchroniser = Synchroniser(self._sync_config)
         self._pipeline = self._declare_pipeline()
@@ -86,7 +88,7 @@ class SituationNode(Node):
         for kind, source, name in (
             (Odometry, Input.ODOMETRY, "odometry"),
             (PolygonStamped, Input.VISIBLE_AREA, "visible_area"),
-            (PerceivedObjects, Input.OBJECTS, "objects"),
+            (self._objects.message_type(), Input.OBJECTS, "objects"),
         ):
             self.create_subscription(kind, f"~/input/{name}", self._receiver(source), NEWEST)
         self.create_subscription(Route, "~/input/route", self._on_route, LATCHED)
@@ -126,7 +128,7 @@ class SituationNode(Node):
         base_to_center_m = self._ego.base_to_center_m
         try:
             seen = conversions.perception_from_messages(
-                *frame[1:], self._map.map_frame, base_to_center_m
+                *frame[1:], self._map.map_frame, base_to_center_m, self._objects
             )
             report = self._pipeline.report(frame.stamp_ns, seen)
         except PlannerError as error:

@@ -9,10 +9,16 @@ import hashlib
 from collections.abc import Sequence
 from typing import Any
 
-from risk_dqn_planner.errors import InputError
 from risk_dqn_planner.ros.adapters.config import NOT_OBSTACLES, NOT_VEHICLES, NOTHING, AdapterConfig
 from risk_dqn_planner.ros.adapters.footprints import Footprint, box_about
-from risk_dqn_planner.ros.adapters.hypotheses import Body, Facing, rotated, vehicles, yaw_of
+from risk_dqn_planner.ros.adapters.hypotheses import (
+    Body,
+    Facing,
+    malformed,
+    rotated,
+    vehicles,
+    yaw_of,
+)
 from risk_dqn_planner.situation.inputs import ObjectArrays
 
 _FACING = {0: Facing.UNKNOWN, 1: Facing.SIGN_UNKNOWN, 2: Facing.KNOWN}
@@ -62,7 +68,7 @@ def _body(item: Any) -> Body:  # noqa: ANN401
     twist = kinematics.twist_with_covariance.twist.linear
     availability = int(kinematics.orientation_availability)
     if availability not in _FACING:
-        raise InputError(f"{name}: orientation_availability is {availability}, expected 0, 1 or 2")
+        raise malformed(f"{name}: orientation_availability is {availability}, expected 0, 1 or 2")
     heading, given = yaw_of(pose.orientation, name)
     shape = _footprint(item.shape, name)
     x, y = rotated(shape.x_m, shape.y_m, heading)
@@ -85,5 +91,5 @@ def _footprint(shape: Any, name: str) -> Footprint:  # noqa: ANN401
     if kind in (_BOUNDING_BOX, _CYLINDER):
         return Footprint(0.0, 0.0, float(shape.dimensions.x), float(shape.dimensions.y))
     if kind != _POLYGON:
-        raise InputError(f"{name}: shape {kind}, expected 0 (box), 1 (cylinder) or 2 (polygon)")
+        raise malformed(f"{name}: shape {kind}, expected 0 (box), 1 (cylinder) or 2 (polygon)")
     return box_about(shape.footprint.points)

@@ -8,9 +8,17 @@ of rclpy and of a bag reader do alike.
 from typing import Any
 
 from risk_dqn_planner.errors import InputError
+from risk_dqn_planner.faults import FaultyInput, Status
 from risk_dqn_planner.ros.adapters.config import NOT_OBSTACLES, NOT_VEHICLES, NOTHING, AdapterConfig
 from risk_dqn_planner.ros.adapters.footprints import NO_FOOTPRINT, Footprint, box_about
-from risk_dqn_planner.ros.adapters.hypotheses import Body, Facing, rotated, vehicles, yaw_of
+from risk_dqn_planner.ros.adapters.hypotheses import (
+    Body,
+    Facing,
+    malformed,
+    rotated,
+    vehicles,
+    yaw_of,
+)
 from risk_dqn_planner.situation.inputs import ObjectArrays
 
 _DETECTED = 0
@@ -38,7 +46,8 @@ def objects_from_derived(message: Any, config: AdapterConfig) -> ObjectArrays:  
     for item in kept:
         own = item.header.frame_id
         if own not in ("", frame_id):
-            raise InputError(f"object {item.id}: frame is {own!r}, expected {frame_id!r}")
+            text = f"object {item.id}: frame is {own!r}, expected {frame_id!r}"
+            raise InputError(text, Status.WRONG_FRAME, FaultyInput.OBJECTS)
     return vehicles((_body(item, config) for item in kept), _ID_STEP)
 
 
@@ -78,9 +87,9 @@ def _footprint(shape: Any, name: str) -> Footprint:  # noqa: ANN401
     if kind not in _NEEDED:
         if not sizes:
             return NO_FOOTPRINT
-        raise InputError(f"{name}: shape {kind}, expected 1 to 5")
+        raise malformed(f"{name}: shape {kind}, expected 1 to 5")
     if len(sizes) < _NEEDED[kind]:
-        raise InputError(f"{name}: {len(sizes)} dimensions, expected {_NEEDED[kind]}")
+        raise malformed(f"{name}: {len(sizes)} dimensions, expected {_NEEDED[kind]}")
     if kind == _BOX:
         return Footprint(0.0, 0.0, sizes[0], sizes[1])
     # Spheres have a radius, cylinders and cones a height and then a radius.

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from risk_dqn_planner.errors import InputError
+from risk_dqn_planner.faults import FaultyInput, Status
 from risk_dqn_planner.situation.inputs import ObjectArrays
 
 # Faster than this (walking pace) something moves ahead, whatever its orientation says.
@@ -57,6 +58,11 @@ class Body(NamedTuple):
     assumed_mps: float | None = None
 
 
+def malformed(text: str) -> InputError:
+    """Return the error for an object of which a field means nothing."""
+    return InputError(text, Status.MALFORMED_INPUT, FaultyInput.OBJECTS)
+
+
 def yaw_of(quaternion: Any, name: str) -> Yaw:  # noqa: ANN401 (any stack's quaternion)
     """Return the heading of a quaternion; one of norm 0 was never set.
 
@@ -68,7 +74,7 @@ def yaw_of(quaternion: Any, name: str) -> Yaw:  # noqa: ANN401 (any stack's quat
     if norm == 0.0:
         return Yaw(0.0, given=False)
     if not abs(norm - 1.0) <= _NORM_TOLERANCE:
-        raise InputError(f"{name}: orientation has norm {norm:g}, expected 1")
+        raise malformed(f"{name}: orientation has norm {norm:g}, expected 1")
     return Yaw(math.atan2(2.0 * (w * z + x * y), w * w + x * x - y * y - z * z), given=True)
 
 

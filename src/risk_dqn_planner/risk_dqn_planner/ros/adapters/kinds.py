@@ -6,7 +6,7 @@ Other stacks' packages are imported only when they are asked for: the planner ne
 
 import importlib
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from risk_dqn_planner.errors import ConfigurationError
@@ -34,16 +34,18 @@ CONVERTERS: dict[str, Converter] = {
 
 @dataclass(frozen=True)
 class ObjectsAdapter:
-    """Makes messages of one type into objects."""
+    """Makes messages of one type into objects; its fields are parameters of the node."""
 
-    type_name: str
-    config: AdapterConfig
+    objects_type: str = field(
+        default=OWN_TYPE,
+        metadata={"description": f"Type of the objects' messages: {', '.join(CONVERTERS)}"},
+    )
+    objects: AdapterConfig = field(default_factory=AdapterConfig)
 
     def __post_init__(self) -> None:
-        if self.type_name not in CONVERTERS:
+        if self.objects_type not in CONVERTERS:
             raise ConfigurationError(
-                f"objects of type {self.type_name!r} are not known, "
-                f"expected one of {', '.join(CONVERTERS)}"
+                f"objects_type is {self.objects_type!r}, expected one of {', '.join(CONVERTERS)}"
             )
 
     def __call__(self, message: Any) -> ObjectArrays:  # noqa: ANN401
@@ -52,7 +54,7 @@ class ObjectsAdapter:
         Raises:
             InputError: an object makes no sense.
         """
-        return CONVERTERS[self.type_name](message, self.config)
+        return CONVERTERS[self.objects_type](message, self.objects)
 
     def message_type(self) -> type:
         """Return the class of the messages, to subscribe with.
@@ -60,13 +62,13 @@ class ObjectsAdapter:
         Raises:
             ConfigurationError: its package is not installed.
         """
-        package, _, name = self.type_name.split("/")
+        package, _, name = self.objects_type.split("/")
         try:
             found: type = getattr(importlib.import_module(f"{package}.msg"), name)
         except (ImportError, AttributeError) as error:
             apt_name = f"ros-$ROS_DISTRO-{package.replace('_', '-')}"
             raise ConfigurationError(
-                f"objects of type {self.type_name} need the package {package}, which is not "
+                f"objects of type {self.objects_type} need the package {package}, which is not "
                 f"installed here: sudo apt install {apt_name}"
             ) from error
         return found

@@ -13,6 +13,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from foreign_messages import NO_ORIENTATION, Fields, quaternion, tracked, tracked_list
 
 from risk_dqn_planner.errors import InputError
+from risk_dqn_planner.faults import FaultyInput, Status
 from risk_dqn_planner.ros.adapters.autoware import id_of_uuid, objects_from_tracked
 from risk_dqn_planner.ros.adapters.config import AdapterConfig
 from risk_dqn_planner.situation.inputs import ObjectArrays, check_objects
@@ -180,6 +181,8 @@ def test_what_cannot_be_is_refused_by_the_name_of_its_object(
     with pytest.raises(InputError, match=complaint) as refused:
         convert(broken)
     assert str(id_of_uuid(range(16))) in str(refused.value)
+    assert refused.value.kind is Status.MALFORMED_INPUT
+    assert refused.value.source is FaultyInput.OBJECTS
 
 
 @pytest.mark.parametrize(

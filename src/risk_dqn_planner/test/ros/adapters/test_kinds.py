@@ -22,7 +22,7 @@ def test_own_objects_pass_as_they_are() -> None:
 
 
 def test_a_type_that_nobody_knows_is_refused_with_those_that_are_known() -> None:
-    with pytest.raises(ConfigurationError, match="cars/msg/Cars") as refused:
+    with pytest.raises(ConfigurationError, match="objects_type is 'cars/msg/Cars'") as refused:
         ObjectsAdapter("cars/msg/Cars", AdapterConfig())
     assert all(name in str(refused.value) for name in CONVERTERS)
 

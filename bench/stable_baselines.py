@@ -127,25 +127,23 @@ def train(setup: Setup, place: Place, limit_s: float) -> Reached:
     model = DQN("MlpPolicy", environment, seed=0, **setup.arguments)
     validation = place.simulation(load_scenario(SCENARIO), EPISODES)
     seeds = fixed_seeds(VALIDATION_SEEDS, EPISODES)
-    reached, watch, looking = Reached(), Stopwatch(), [0.0, 0.0]
+    reached, watch = Reached(), Stopwatch()
     looked = 0
 
     def look(_locals: dict[str, Any], _globals: dict[str, Any]) -> bool:
         """Validate now and then; return whether to go on."""
         nonlocal looked
         if model.num_timesteps - looked < LOOK_EVERY_STEPS:
-            return watch.cpu_s - looking[0] <= limit_s
+            return watch.cpu_s <= limit_s
         looked = model.num_timesteps
-        cpu_s, wall_s = watch.cpu_s, watch.wall_s
-        success = drive(validation, PeerPolicy(model.q_net), seeds).share(Outcome.SUCCESS)
-        reached.look(success, cpu_s - looking[0], wall_s - looking[1], looked)
-        say(f"  {looked} steps, {cpu_s - looking[0]:.0f} s: success {success:.1%}")
-        looking[0] += watch.cpu_s - cpu_s
-        looking[1] += watch.wall_s - wall_s
-        return not reached.done and watch.cpu_s - looking[0] <= limit_s
+        with watch.stopped():
+            success = drive(validation, PeerPolicy(model.q_net), seeds).share(Outcome.SUCCESS)
+        reached.look(success, watch.cpu_s, watch.wall_s, looked)
+        say(f"  {looked} steps, {watch.cpu_s:.0f} s: success {success:.1%}")
+        return not reached.done and watch.cpu_s <= limit_s
 
     model.learn(setup.steps, callback=look)
     environment.close()
     if not reached.done:
-        reached.cpu_s = watch.cpu_s - looking[0]
+        reached.cpu_s = watch.cpu_s
     return reached

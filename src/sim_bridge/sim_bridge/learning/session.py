@@ -237,11 +237,14 @@ class Session:
             validation=validation,
         )
 
-    def _score(self, simulations: Sequence[Simulation]) -> Score:
+    def policy(self) -> Policy:
+        """Return the greedy policy, supervised as in the run; it goes on learning with the run."""
+        policy = GreedyPolicy(self._learner, StateEncoder(self.state_config))
         run = self.run_description
-        policy: Policy = GreedyPolicy(self._learner, StateEncoder(self.state_config))
-        if run.supervised:
-            policy = Supervisor(policy, assumptions=run.assumptions)
+        return Supervisor(policy, assumptions=run.assumptions) if run.supervised else policy
+
+    def _score(self, simulations: Sequence[Simulation]) -> Score:
+        policy = self.policy()
         seeds = fixed_seeds(VALIDATION_SEEDS, max(each.batch for each in simulations))
         return Score.of([drive(each, policy, seeds[: each.batch]) for each in simulations])
 

@@ -23,7 +23,7 @@ ROS_MODULES = {
 FOUNDATION = ("faults", "errors", "compiled_cache", "compiled", "settled", "vehicle", "geometry")
 ROOMS = (
     *FOUNDATION, "map", "intersection", "situation", "risk", "safety", "state", "policies",
-    "decision",
+    "explanation", "decision",
 )  # fmt: skip
 
 

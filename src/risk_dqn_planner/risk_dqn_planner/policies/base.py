@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from risk_dqn_planner.faults import Status
+from risk_dqn_planner.safety.joint_check import JointCheck
 from risk_dqn_planner.situation.situations import Booleans, Floats, Integers, Situations
 
 
@@ -80,6 +81,8 @@ class Decisions(NamedTuple):
     supervision (B,): Supervision, and proposed (B,): the action before it was checked; None
     without a supervisor. lacking_s (B,): where the joint check forbids the next faster action, or
     the proposed one, the time that is missing; NaN where something else decided, None if all.
+    check: what the joint check says, and in_force (B,): the action before, which it counts on;
+    None where nobody checked.
     """
 
     action: NDArray[np.int64]
@@ -91,6 +94,8 @@ class Decisions(NamedTuple):
     supervision: Integers | None = None
     proposed: Integers | None = None
     lacking_s: Floats | None = None
+    check: JointCheck | None = None
+    in_force: Integers | None = None
 
 
 class Policy(Protocol):

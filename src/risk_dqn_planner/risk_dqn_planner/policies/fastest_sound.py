@@ -58,11 +58,16 @@ class FastestSoundPolicy:
         action = Action.FAST - self._guard.sound(check)[:, ::-1].argmax(axis=1)
         self._guard.decided(check, action)
         vehicle, lane, lacking_s = what_forbids(check, np.minimum(action + 1, Action.FAST))
-        return sound_decisions(check, action, vehicle, lane, lacking_s)
+        return sound_decisions(self._guard, check, action, vehicle, lane, lacking_s)
 
 
 def sound_decisions(
-    check: JointCheck, action: Integers, vehicle: Integers, lane: Integers, lacking_s: Floats
+    guard: Guard,
+    check: JointCheck,
+    action: Integers,
+    vehicle: Integers,
+    lane: Integers,
+    lacking_s: Floats,
 ) -> Decisions:
     """Return decisions for sound actions (B,), and what kept each from being faster (B,)."""
     hindered = np.where(vehicle >= 0, Reason.VEHICLE, Reason.HIDDEN_VEHICLE)
@@ -74,6 +79,8 @@ def sound_decisions(
         critical_vehicle=vehicle,
         critical_lane=lane,
         lacking_s=lacking_s,
+        check=check,
+        in_force=guard.in_force,
     )
 
 

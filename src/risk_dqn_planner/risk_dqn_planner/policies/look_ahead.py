@@ -151,7 +151,7 @@ class LookAheadPolicy:
         keeps = (lane < 0) & (action < Action.FAST)
         vehicle = np.where(keeps, critical[:, 0], vehicle)
         lane = np.where(keeps, critical[:, 1], lane)
-        return sound_decisions(check, action, vehicle, lane, lacking_s)
+        return sound_decisions(self._guard, check, action, vehicle, lane, lacking_s)
 
     def _fit(self, situations: Situations) -> None:
         """Have room for situations of their shape."""

@@ -112,6 +112,8 @@ class Supervisor:
             supervision=np.where(unsound, objection, Supervision.AGREED),
             proposed=proposed,
             lacking_s=np.where(unsound, lacking_s, np.nan),
+            check=check,
+            in_force=self._guard.in_force,
         )
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Between messages and the core's types: the only file that touches the fields of messages.
+"""Between messages and the core's types: only here, and in explanations.py, are fields touched.
 
 Nothing is trusted: what comes in is checked for finite numbers here or, where the core looks at
 it anyway (ego, objects, visible area), there. A violation raises InputError.
@@ -28,6 +28,7 @@ from risk_dqn_planner.decision import Action, Decision, Reason
 from risk_dqn_planner.errors import InputError
 from risk_dqn_planner.faults import FaultyInput, Status
 from risk_dqn_planner.policies.base import Supervision
+from risk_dqn_planner.ros.explanations import explanation_from_message, explanation_to_message
 from risk_dqn_planner.situation.inputs import EgoPose, ObjectArrays, Perception
 from risk_dqn_planner.situation.report import SituationReport
 from risk_dqn_planner.situation.situations import Floats, Situations, empty_situations
@@ -315,6 +316,7 @@ def decision_to_message(
         action_risks=np.asarray(decision.action_risks, dtype=np.float64),
         critical_vehicle_id=_id_to_message(decision.critical_vehicle_id),
         critical_lane_id=_id_to_message(decision.critical_lane_id),
+        explanation=explanation_to_message(decision.explanation),
         supervisor=int(decision.supervision),
         proposed=int(decision.action if decision.proposed is None else decision.proposed),
         policy_name=decision.policy_name,
@@ -328,12 +330,14 @@ def decision_from_message(message: DecisionMessage) -> Decision:
     """Return the decision; its times stay in the message.
 
     Raises:
-        InputError: unknown action, reason, faulty input or verdict of the supervisor.
+        InputError: a code is unknown, of its action, reason, faulty input, supervisor or
+            explanation.
     """
     try:
         action, reason = Action(message.action), Reason(message.reason)
         supervision, proposed = Supervision(message.supervisor), Action(message.proposed)
         faulty_input = FaultyInput(message.faulty_input)
+        explanation = explanation_from_message(message.explanation)
     except ValueError as error:
         raise InputError(f"decision: {error}") from error
     return Decision(
@@ -348,6 +352,7 @@ def decision_from_message(message: DecisionMessage) -> Decision:
         critical_lane_id=_id_from_message(message.critical_lane_id),
         policy_name=message.policy_name,
         policy_hash=message.policy_hash,
+        explanation=explanation,
         supervision=supervision,
         proposed=None if supervision is Supervision.OFF else proposed,
     )

@@ -42,7 +42,9 @@ class PolicyNode(Node):
         self._settings = declare(self, PolicyParameters)
         self._mode = supervisor_mode(self._settings.supervisor)
         self._assumptions = declare_assumptions(self, self._settings.rate_hz)
-        self._explain = partial(explain, config=config_of(self._assumptions))
+        self._explain = partial(
+            explain, config=config_of(self._assumptions), assumptions=self._assumptions
+        )
         config = declare(self, DeciderConfig)
         patience_s = declare(self, ClockParameters).sim_time_patience_s
         self._patient = is_simulated(self) and patience_s > 0.0

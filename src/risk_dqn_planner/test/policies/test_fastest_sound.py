@@ -41,7 +41,7 @@ def test_it_stops_for_a_vehicle_and_says_so(situation: Make) -> None:
     assert chosen(decisions) == (Action.STOP, Reason.VEHICLE, 0, 0)
     assert decisions.action_risks[0].tolist() == [0.0, 1.0, 1.0]
     text = explain(decisions, s, 0, policy).text
-    assert text.startswith("STOP: vehicle 8 can reach the conflict zone of lane 3 in 2.4 s")
+    assert text.startswith("STOP: vehicle 8 reaches conflict zone of lane 3 in 2.4 s")
 
 
 def test_it_slows_down_where_fast_could_not_stop_any_more(situation: Make) -> None:

@@ -35,7 +35,7 @@ def test_it_goes_at_once_on_an_empty_road(situation: Make) -> None:
     decisions = policy.decide(s, NEW)
     assert decisions.action[0] == Action.FAST
     assert decisions.reason[0] == Reason.CLEAR
-    assert explain(decisions, s, 0, policy).text == "FAST: no conflict within range"
+    assert explain(decisions, s, 0, policy).text.startswith("FAST: lane 4 is hidden beyond 70.0 m")
 
 
 def test_it_goes_where_no_lane_conflicts(situation: Make) -> None:
@@ -53,7 +53,7 @@ def test_it_keeps_back_for_a_run_up_and_says_so(situation: Make) -> None:
     assert decisions.action[0] < Action.FAST
     decision = explain(decisions, s, 0, policy)
     assert decision.critical_vehicle_id == 8
-    assert "the ego keeps back" in decision.text
+    assert "keeps back" in decision.text
 
 
 def test_it_drives_nearer_where_it_cannot_see_far_enough(situation: Make) -> None:

@@ -53,9 +53,10 @@ def test_an_enforcing_supervisor_replaces_what_is_not_sound_and_says_why(situati
     assert decision.reason is Reason.VEHICLE
     assert decision.critical_vehicle_id == 8
     # 17 / 7 = 2.4286 s less 2.8636 + 0.1 s, see test_joint_check.
+    assert decision.explanation.lacking_s == pytest.approx(0.535, abs=1e-3)
     assert decision.text == (
-        "STOP: the supervisor overrules FAST; vehicle 8 can reach the conflict zone of lane 3 "
-        "in 2.4 s, no safe manoeuvre would be left after FAST by 0.5 s"
+        "STOP: supervisor overrules FAST; vehicle 8 reaches conflict zone of lane 3 in 2.4 s, "
+        "leaving takes 2.9 s (gap wanted 0.1 s)"
     )
 
 
@@ -66,7 +67,7 @@ def test_a_reporting_supervisor_lets_it_pass_and_says_so(situation: Make) -> Non
     decision = explain(decisions, s, 0, supervisor)
     assert decision.supervision is Supervision.OBJECTED
     assert decision.reason is Reason.FIXED
-    assert "; the supervisor objects to FAST; vehicle 8" in decision.text
+    assert "FAST: supervisor objects; vehicle 8" in decision.text
 
 
 def test_a_supervisor_that_is_off_is_not_there(situation: Make) -> None:
@@ -117,7 +118,8 @@ def test_where_stopping_is_not_sound_the_ego_is_driven_on(situation: Make) -> No
     assert decisions.action[0] == Action.FAST
     decision = explain(decisions, s, 0, supervisor)
     assert decision.proposed is Action.STOP
-    assert "after STOP" in decision.text
+    assert decision.explanation.considered is Action.STOP
+    assert decision.text.startswith("FAST: supervisor overrules STOP; vehicle 8 ")
 
 
 def test_an_action_once_found_sound_is_carried_on_when_nothing_is(situation: Make) -> None:

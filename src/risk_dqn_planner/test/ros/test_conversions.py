@@ -10,13 +10,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from intersection_msgs.msg import Decision as DecisionMessage
+from intersection_msgs.msg import Explanation as ExplanationMessage
 from intersection_msgs.msg import PerceivedObjects, RelevantVehicle
 from intersection_msgs.msg import Situation as SituationMessage
 from nav_msgs.msg import Odometry
 from rclpy.serialization import deserialize_message, serialize_message
 
-from risk_dqn_planner.decision import Action, Decision, Reason
+from risk_dqn_planner.decision import Action, Decision, Reason, fault_decision
 from risk_dqn_planner.errors import InputError
+from risk_dqn_planner.explanation.fields import NOTHING_EXPLAINED, Critical, Explanation, Verdict
 from risk_dqn_planner.policies.base import Supervision
 from risk_dqn_planner.ros import conversions
 from risk_dqn_planner.situation.inputs import EgoPose, object_arrays
@@ -43,6 +45,15 @@ DECISION = Decision(
     critical_lane_id=None,
     policy_name="rule_based",
     policy_hash="f" * 64,
+    explanation=Explanation(
+        considered=Action.FAST,
+        verdict=Verdict.TOO_LATE,
+        critical=Critical.APPROACHING,
+        merging=True,
+        distance_m=12.5,
+        reach_s=2.1,
+        margins_s=(math.inf, 0.5, -1.0),
+    ),
 )
 
 
@@ -202,6 +213,11 @@ def test_the_codes_of_decisions_are_those_of_the_message() -> None:
     assert found == expected
 
 
+def test_the_codes_of_explanations_are_those_of_the_message() -> None:
+    expected = codes(Action, Verdict, Critical) | {"NO_ACTION": ExplanationMessage.NO_ACTION}
+    assert constants(ExplanationMessage) == expected
+
+
 def test_every_fault_of_a_situation_is_a_reason_to_stop_with_the_same_name_and_code() -> None:
     faults = {status.name: int(status) for status in Status if status is not Status.OK}
     reasons = {reason.name: int(reason) for reason in Reason if reason.is_fault}
@@ -248,6 +264,7 @@ def test_a_decision_survives_the_way_over_the_wire() -> None:
     assert received.situation_age_s == pytest.approx(0.25)
     assert conversions.to_ns(received.situation_stamp) == STAMP_NS - 250_000_000
     assert received.critical_lane_id == DecisionMessage.NO_ID
+    assert math.isnan(received.explanation.leave_s)
 
 
 def test_every_verdict_of_the_supervisor_has_the_code_of_the_message() -> None:
@@ -294,3 +311,17 @@ def test_a_decision_without_a_situation_has_a_negative_age() -> None:
 def test_an_unknown_action_is_refused() -> None:
     with pytest.raises(InputError, match="decision: 9 is not a valid Action"):
         conversions.decision_from_message(DecisionMessage(action=9))
+
+
+def test_a_decision_with_an_unknown_verdict_is_refused() -> None:
+    message = conversions.decision_to_message(DECISION, STAMP_NS)
+    message.explanation.verdict = 99
+    with pytest.raises(InputError, match="decision: 99 is not a valid Verdict"):
+        conversions.decision_from_message(message)
+
+
+def test_a_fault_considers_no_action() -> None:
+    fault = fault_decision(Reason.STALE_INPUT, "odometry is old")
+    message = conversions.decision_to_message(fault, STAMP_NS)
+    assert message.explanation.considered == ExplanationMessage.NO_ACTION
+    assert conversions.decision_from_message(message).explanation == NOTHING_EXPLAINED

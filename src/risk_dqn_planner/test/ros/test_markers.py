@@ -105,7 +105,7 @@ def test_the_verdict_of_a_supervisor_is_written_below_the_decision() -> None:
     none = np.full(3, math.nan)
     decision = Decision(
         Action.STOP, 0.0, Reason.VEHICLE, "STOP: vehicle 17", none, none, 17, 3, "p", "",
-        Supervision.OVERRULED, Action.FAST,
+        supervision=Supervision.OVERRULED, proposed=Action.FAST,
     )  # fmt: skip
     (marker,) = by_namespace(decision_markers(decision, STAMP_NS, "map"))["decision"]
     assert marker.text == "STOP: vehicle 17\nsupervisor: OVERRULED"

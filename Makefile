@@ -87,6 +87,12 @@ ship: ## ship a trained run, without RUN only write the cards [RUN=out/training/
 bench: ## measure all beside highway-env, libsumo and stable-baselines3 [ARGS='--quick']
 	@$(WITH_ROS) python tools/peers.py -- python -m bench $(ARGS)
 
+.PHONY: story
+story: ## tell when and why decisions changed: BAG=bags/... [TOPIC PICTURE=story.png ARGS=--all]
+	@$(if $(BAG),,echo 'error: say which bag, for example make story BAG=bags/four_way' >&2; exit 2)
+	@$(WITH_ROS) $(SIMULATION)/story '$(BAG)' $(call option,--topic,TOPIC) \
+	  $(call option,--picture,PICTURE) $(ARGS)
+
 shell: ## open a shell in which the nodes run [ARGS="-c 'command'"]
 	@$(WITH_ROS) bash --rcfile tools/shell.bashrc $(ARGS)
 

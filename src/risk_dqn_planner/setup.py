@@ -34,7 +34,7 @@ setup(
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
-        *data_files("launch", "config", "rviz", "models"),
+        *data_files("launch", "config", "rviz", "foxglove", "models"),
     ],
     python_requires=">=3.10",
     install_requires=["setuptools"],

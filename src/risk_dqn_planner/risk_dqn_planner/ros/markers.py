@@ -1,124 +1,88 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What RViz and Foxglove show: one namespace a concept, everything in the frame of the map.
-
-Markers keep their ids from message to message; what may vanish bears a lifetime.
-"""
+"""What RViz and Foxglove show: one namespace a concept, everything in the frame of the map."""
 
 import math
-from collections.abc import Iterator
+import textwrap
+from collections.abc import Iterator, Sequence
 
 import numpy as np
-from geometry_msgs.msg import Point
-from std_msgs.msg import ColorRGBA
-from visualization_msgs.msg import Marker, MarkerArray
+from visualization_msgs.msg import MarkerArray
 
 from risk_dqn_planner.decision import Action, Decision
-from risk_dqn_planner.geometry.footprint import footprint_corners
 from risk_dqn_planner.geometry.polyline import Polyline
 from risk_dqn_planner.intersection.model import ConflictKind, IntersectionModel
 from risk_dqn_planner.policies.base import Supervision
-from risk_dqn_planner.ros.conversions import header, to_duration
-from risk_dqn_planner.situation.inputs import ObjectArrays, Perception
-from risk_dqn_planner.situation.report import SituationReport
+from risk_dqn_planner.risk.risk import RiskConfig, assess
+from risk_dqn_planner.ros.marker_builder import (
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    RED,
+    WHITE,
+    Box,
+    MarkerBuilder,
+    Rgb,
+)
+from risk_dqn_planner.situation.builder import SituationBuilder
+from risk_dqn_planner.situation.inputs import EgoPose, ObjectArrays, Perception, object_arrays
+from risk_dqn_planner.situation.report import SituationReport, Status
 from risk_dqn_planner.situation.situations import Floats, Situations
+from risk_dqn_planner.situation.warm_up import crossing_model, square
 from risk_dqn_planner.vehicle import VehicleDimensions
 
-LIFETIME_S = 1.0
-_GREY, _BLUE, _GREEN = (0.6, 0.6, 0.6), (0.2, 0.5, 1.0), (0.2, 0.8, 0.3)
-_ORANGE, _RED, _WHITE = (1.0, 0.6, 0.1), (0.9, 0.2, 0.2), (1.0, 1.0, 1.0)
-_KIND_COLORS = {ConflictKind.CROSSING: _ORANGE, ConflictKind.MERGING: _BLUE}
-_ACTION_COLORS = {Action.STOP: _RED, Action.SLOW: _ORANGE, Action.FAST: _GREEN}
+_KIND_COLORS = {ConflictKind.CROSSING: ORANGE, ConflictKind.MERGING: BLUE}
+_ACTION_COLORS = {Action.STOP: RED, Action.SLOW: ORANGE, Action.FAST: GREEN}
+_TEXT_LETTERS = 56
 
-Rgb = tuple[float, float, float]
-Box = tuple[float, float, float, float, float]  # x, y, heading, length, width
-
-
-class MarkerBuilder:
-    """Collects the markers of one message, numbering them within each namespace."""
-
-    def __init__(self, stamp_ns: int, frame_id: str) -> None:
-        self._stamp_ns = stamp_ns
-        self._frame_id = frame_id
-        self._markers: list[Marker] = []
-        self._counts: dict[str, int] = {}
-
-    def message(self) -> MarkerArray:
-        """Return everything added."""
-        return MarkerArray(markers=self._markers)
-
-    def line(
-        self, namespace: str, points: Floats, rgb: Rgb, width_m: float = 0.15, alpha: float = 0.8
-    ) -> None:
-        """Add a line through points (K, 2)."""
-        marker = self._add(namespace, Marker.LINE_STRIP, rgb, alpha)
-        marker.scale.x = width_m
-        marker.points = [_point(x, y) for x, y in points.tolist()]
-
-    def boxes(self, namespace: str, boxes: list[Box], rgb: Rgb) -> None:
-        """Add the outlines of vehicles as one marker; none at all deletes it."""
-        marker = self._add(namespace, Marker.LINE_LIST, rgb, 1.0)
-        marker.scale.x = 0.15
-        if not boxes:
-            marker.action = Marker.DELETE
-        for box in boxes:
-            corners = [_point(x, y) for x, y in footprint_corners(*box).tolist()]
-            for k in range(4):
-                marker.points += [corners[k], corners[(k + 1) % 4]]
-
-    def text(self, namespace: str, x: float, y: float, text: str, rgb: Rgb) -> None:
-        """Add a text that vanishes unless it is sent again."""
-        marker = self._add(namespace, Marker.TEXT_VIEW_FACING, rgb, 1.0)
-        marker.pose.position = _point(x, y, 2.0)
-        marker.scale.z = 1.2
-        marker.text = text
-        marker.lifetime = to_duration(LIFETIME_S)
-
-    def _add(self, namespace: str, kind: int, rgb: Rgb, alpha: float) -> Marker:
-        number = self._counts.get(namespace, 0)
-        self._counts[namespace] = number + 1
-        marker = Marker(
-            header=header(self._stamp_ns, self._frame_id),
-            ns=namespace,
-            id=number,
-            type=kind,
-            action=Marker.ADD,
-            color=ColorRGBA(r=rgb[0], g=rgb[1], b=rgb[2], a=alpha),
-        )
-        marker.pose.orientation.w = 1.0
-        self._markers.append(marker)
-        return marker
-
-
-def _point(x: float, y: float, z: float = 0.0) -> Point:
-    return Point(x=float(x), y=float(y), z=z)
+# Of each path of a lane: nearest and furthest distance to the zone's centre [m].
+Places = Sequence[Sequence[tuple[float, float]]]
 
 
 def situation_markers(
-    model: IntersectionModel, report: SituationReport, seen: Perception, frame_id: str
+    model: IntersectionModel,
+    report: SituationReport,
+    seen: Perception,
+    frame_id: str,
+    hidden_places: Places = (),
 ) -> MarkerArray:
-    """Return the intersection and what is perceived on it."""
+    """Return the intersection and what is perceived on it.
+
+    hidden_places: where a memory of hidden space says that vehicles may be, for each path of each
+    lane in the model's order; empty without such a memory.
+    """
     builder = MarkerBuilder(report.stamp_ns, frame_id)
     _add_model(builder, model)
     size = model.ego_dimensions
     ego = seen.ego
     box = (ego.x_m, ego.y_m, ego.heading_rad, size.length_m, size.width_m)
-    builder.boxes("ego", [box], _GREEN)
+    builder.boxes("ego", [box], GREEN)
     closed = np.concatenate([seen.visible_area, seen.visible_area[:1]])
-    builder.line("visible_area", closed, _WHITE, alpha=0.5)
+    builder.line("visible_area", closed, WHITE, alpha=0.5)
     boxes = list(_object_boxes(seen.objects, model.traffic_dimensions))
-    builder.boxes("objects", boxes, _GREY)
+    builder.boxes("objects", boxes, GREY)
     if report.situations is not None:
-        _add_vehicles(builder, model, report.situations, seen.objects)
-        _add_hidden(builder, model, report.situations)
+        risk = assess(report.situations, RiskConfig(), include_hidden=True)
+        _add_vehicles(builder, model, report.situations, seen.objects, 0.0 - risk.vehicle_reward[0])
+        _add_hidden(builder, model, report.situations, 0.0 - risk.lane_reward[0])
+        _add_places(builder, model, hidden_places)
     return builder.message()
+
+
+def warm_up() -> None:
+    """Compile what markers need, so that no situation waits for it when somebody looks."""
+    seen = Perception(EgoPose(-20.0, 0.0, 0.0, 4.0), object_arrays([]), square(40.0))
+    situations = SituationBuilder(crossing_model()).build(*seen)
+    report = SituationReport(0, Status.OK, "", situations=situations)
+    situation_markers(crossing_model(), report, seen, "map")
 
 
 def _add_model(builder: MarkerBuilder, model: IntersectionModel) -> None:
     ego = model.ego_path.centerline
-    builder.line("ego_path", ego.xy, _GREEN, alpha=0.4)
+    builder.line("ego_path", ego.xy, GREEN, alpha=0.4)
     front_m = model.stop_line.position_m + 0.5 * model.ego_dimensions.length_m
-    builder.line("stop_line", _across(ego, front_m, model.ego_path.half_width_m), _RED, 0.3)
-    builder.line("goal", _across(ego, model.goal_m, model.ego_path.half_width_m), _GREEN, 0.3)
+    builder.line("stop_line", _across(ego, front_m, model.ego_path.half_width_m), RED, 0.3)
+    builder.line("goal", _across(ego, model.goal_m, model.ego_path.half_width_m), GREEN, 0.3)
     for lane in model.lanes:
         rgb = _KIND_COLORS[lane.kind]
         for conflict in lane.paths:
@@ -149,25 +113,56 @@ def _object_boxes(objects: ObjectArrays, assumed: VehicleDimensions) -> Iterator
 
 
 def _add_vehicles(
-    builder: MarkerBuilder, model: IntersectionModel, given: Situations, objects: ObjectArrays
+    builder: MarkerBuilder,
+    model: IntersectionModel,
+    given: Situations,
+    objects: ObjectArrays,
+    risks: Floats,
 ) -> None:
-    """Show which objects matter, and how far they are from which zone."""
+    """Show which objects matter, how far they are from which zone, and R_risk of each (N,)."""
     index = {int(number): k for k, number in enumerate(objects.id)}
     boxes = list(_object_boxes(objects, model.traffic_dimensions))
     labels: dict[int, list[str]] = {}
+    highest: dict[int, float] = {}
     for k in np.flatnonzero(given.vehicle_mask[0]):
-        lane_id = given.lane_id[0, given.vehicle_lane[0, k]]
-        text = f"lane {lane_id}: {given.vehicle_distance_m[0, k]:.1f} m"
-        labels.setdefault(int(given.vehicle_id[0, k]), []).append(text)
-    builder.boxes("vehicles", [boxes[index[number]] for number in labels], _RED)
+        number, lane_id = int(given.vehicle_id[0, k]), given.lane_id[0, given.vehicle_lane[0, k]]
+        text = (
+            f"lane {lane_id}: {given.vehicle_distance_m[0, k]:.1f} m, "
+            f"{given.vehicle_speed_mps[0, k]:.1f} m/s"
+        )
+        labels.setdefault(number, []).append(text)
+        highest[number] = max(highest.get(number, 0.0), float(risks[k]))
+    builder.boxes("vehicles", [boxes[index[number]] for number in labels], RED)
+    shown = [boxes[index[number]] for number in highest]
+    _add_risks(builder, "vehicle_risks", shown, list(highest.values()))
     for number, lines in labels.items():
         x, y = boxes[index[number]][:2]
-        builder.text("vehicle_distances", x, y, "\n".join([f"vehicle {number}", *lines]), _WHITE)
+        builder.text("vehicle_distances", x, y, "\n".join([f"vehicle {number}", *lines]), WHITE)
 
 
-def _add_hidden(builder: MarkerBuilder, model: IntersectionModel, given: Situations) -> None:
-    """Show where vehicles are assumed to hide; on each branch of a lane at the lane's distance."""
+def _add_risks(
+    builder: MarkerBuilder, namespace: str, boxes: list[Box], risks: list[float]
+) -> None:
+    """Fill footprints from green, safe, to red, fully unsafe, and write the risk beside them."""
+    builder.areas(namespace, boxes, [_risk_color(risk) for risk in risks])
+    for (x, y, _, length_m, _), risk in zip(boxes, risks, strict=True):
+        builder.text(namespace, x, y - 0.75 * length_m, f"risk {risk:.2f}", _risk_color(risk))
+
+
+def _risk_color(risk: float) -> Rgb:
+    red, green, blue = (risk * r + (1.0 - risk) * g for r, g in zip(RED, GREEN, strict=True))
+    return red, green, blue
+
+
+def _add_hidden(
+    builder: MarkerBuilder, model: IntersectionModel, given: Situations, risks: Floats
+) -> None:
+    """Show where vehicles are assumed to hide, with their R_risk (M,).
+
+    On each branch of a lane at the lane's distance.
+    """
     boxes: list[Box] = []
+    shown: list[float] = []
     size = model.traffic_dimensions
     for k, lane in enumerate(model.lanes):
         distance = float(given.lane_hidden_distance_m[0, k])
@@ -176,8 +171,21 @@ def _add_hidden(builder: MarkerBuilder, model: IntersectionModel, given: Situati
             s = conflict.zone_center_m - distance
             x, y = line.position(s)
             boxes.append((x, y, line.heading_at(s), size.length_m, size.width_m))
-            builder.text("hidden_distances", x, y, f"hidden {distance:.1f} m", _BLUE)
-    builder.boxes("hidden", boxes, _BLUE)
+            shown.append(float(risks[k]))
+            builder.text("hidden_distances", x, y, f"hidden {distance:.1f} m", BLUE)
+    builder.boxes("hidden", boxes, BLUE)
+    _add_risks(builder, "hidden_risks", boxes, shown)
+
+
+def _add_places(builder: MarkerBuilder, model: IntersectionModel, places: Places) -> None:
+    """Show all places that a memory says may hide a vehicle."""
+    paths = [conflict for lane in model.lanes for conflict in lane.paths]
+    parts = [
+        _part(path.path.centerline, path.zone_center_m - far, path.zone_center_m - near)
+        for path, intervals in zip(paths, places, strict=False)
+        for near, far in intervals
+    ]
+    builder.lines("hidden_places", parts, BLUE, width_m=1.5)
 
 
 def decision_markers(decision: Decision, stamp_ns: int, frame_id: str) -> MarkerArray:
@@ -186,7 +194,7 @@ def decision_markers(decision: Decision, stamp_ns: int, frame_id: str) -> Marker
     Where a supervisor ran, its verdict is the second line.
     """
     builder = MarkerBuilder(stamp_ns, frame_id)
-    lines = [decision.text]
+    lines = textwrap.wrap(decision.text, _TEXT_LETTERS)
     if decision.supervision is not Supervision.OFF:
         lines.append(f"supervisor: {decision.supervision.name}")
     builder.text("decision", 0.0, 0.0, "\n".join(lines), _ACTION_COLORS[decision.action])

@@ -60,6 +60,12 @@ class SituationPipeline:
             self._builders[route] = builder
         return self._builders[route]
 
+    @property
+    def hidden_places(self) -> list[list[tuple[float, float]]]:
+        """Where the memory says that hidden vehicles may be, by path; empty without a memory."""
+        memory = None if self._builder is None else self._builder.memory
+        return [] if memory is None else memory.intervals()
+
     def report(self, stamp_ns: int, seen: Perception) -> SituationReport:
         """Return the situation at the objects' time, or the input's fault."""
         if self._builder is None:

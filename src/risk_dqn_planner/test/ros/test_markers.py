@@ -9,7 +9,8 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from risk_dqn_planner.decision import Action, Decision, Reason
 from risk_dqn_planner.policies.base import Supervision
-from risk_dqn_planner.ros.markers import decision_markers, situation_markers
+from risk_dqn_planner.risk.risk import assess_into
+from risk_dqn_planner.ros.markers import Places, decision_markers, situation_markers, warm_up
 from risk_dqn_planner.situation.builder import SituationBuilder
 from risk_dqn_planner.situation.inputs import EgoPose, Perception, object_arrays
 from risk_dqn_planner.situation.report import SituationReport, Status
@@ -19,12 +20,17 @@ NORTH = math.pi / 2
 STAMP_NS = 5_000_000_000
 
 
-def shown(rows: list[list[float]], half_size_m: float = 40.0) -> dict[str, list[Marker]]:
-    """Markers by namespace for an ego 20 m before the crossing."""
-    seen = Perception(EgoPose(-20.0, 0.0, 0.0, 4.0), object_arrays(rows), square(half_size_m))
+def shown(
+    rows: list[list[float]],
+    half_size_m: float = 40.0,
+    ego_x_m: float = -20.0,
+    places: Places = (),
+) -> dict[str, list[Marker]]:
+    """Markers by namespace for an ego before the crossing."""
+    seen = Perception(EgoPose(ego_x_m, 0.0, 0.0, 4.0), object_arrays(rows), square(half_size_m))
     situations = SituationBuilder(crossing_model()).build(*seen)
     report = SituationReport(STAMP_NS, Status.OK, "", (10,), situations=situations)
-    message = situation_markers(crossing_model(), report, seen, "map")
+    message = situation_markers(crossing_model(), report, seen, "map", places)
     return by_namespace(message)
 
 
@@ -45,7 +51,8 @@ def box(marker: Marker) -> tuple[float, float, float, float]:
 def test_each_concept_has_its_namespace() -> None:
     assert set(shown([[0.0, -30.0, NORTH, 5.0]])) == {
         "ego_path", "stop_line", "goal", "lanes", "zones", "ego", "visible_area", "objects",
-        "vehicles", "vehicle_distances", "hidden", "hidden_distances",
+        "vehicles", "vehicle_distances", "vehicle_risks", "hidden", "hidden_distances",
+        "hidden_risks", "hidden_places",
     }  # fmt: skip
 
 
@@ -59,8 +66,26 @@ def test_a_relevant_vehicle_is_outlined_and_told_with_its_distance() -> None:
     (vehicle,), (text,) = markers["vehicles"], markers["vehicle_distances"]
     # 4 m long and 2 m wide where its size is unknown.
     assert box(vehicle) == pytest.approx((-1.0, -32.0, 1.0, -28.0))
-    assert text.text == "vehicle 1\nlane 1: 30.0 m"
+    assert text.text == "vehicle 1\nlane 1: 30.0 m, 5.0 m/s"
     assert len(markers["objects"][0].points) == 2 * len(vehicle.points)
+
+
+def test_a_risk_is_told_by_colour_and_number() -> None:
+    # 5 m before its zone at 5 m/s; the ego, 20 m before it, can still stop: no risk.
+    area, text = shown([[0.0, -8.0, NORTH, 5.0]])["vehicle_risks"]
+    assert box(area) == pytest.approx((-1.0, -10.0, 1.0, -6.0))
+    assert text.text == "risk 0.00"
+    assert area.colors[0].g > area.colors[0].r
+    # 4 m before it at 4 m/s it cannot: 1 m before the zone it needs 2.3 m.
+    area, text = shown([[0.0, -8.0, NORTH, 5.0]], ego_x_m=-4.0)["vehicle_risks"]
+    assert text.text == "risk 1.00"
+    assert area.colors[0].r > area.colors[0].g
+
+
+def test_places_that_a_memory_calls_hidden_are_lines_on_the_lane() -> None:
+    places = shown([], places=[[(20.0, 30.0), (50.0, 60.0)]])["hidden_places"][0]
+    assert [p.y for p in places.points] == [-30.0, -20.0, -60.0, -50.0]
+    assert [m.action for m in shown([])["hidden_places"]] == [Marker.DELETE]
 
 
 def test_without_vehicles_their_marker_is_deleted() -> None:
@@ -101,6 +126,17 @@ def test_the_decision_is_written_at_the_origin_of_its_frame() -> None:
     assert marker.lifetime.sec == 1
 
 
+def test_a_long_reason_is_written_on_several_lines() -> None:
+    none = np.full(3, math.nan)
+    text = (
+        "STOP: vehicle 17 reaches conflict zone of lane 3 in 2.1 s, leaving takes 3.4 s with SLOW"
+    )
+    decision = Decision(Action.STOP, 0.0, Reason.VEHICLE, text, none, none, 17, 3, "p", "")
+    (marker,) = by_namespace(decision_markers(decision, STAMP_NS, "map"))["decision"]
+    assert " ".join(marker.text.split("\n")) == text
+    assert max(map(len, marker.text.split("\n"))) <= 56
+
+
 def test_the_verdict_of_a_supervisor_is_written_below_the_decision() -> None:
     none = np.full(3, math.nan)
     decision = Decision(
@@ -109,3 +145,10 @@ def test_the_verdict_of_a_supervisor_is_written_below_the_decision() -> None:
     )  # fmt: skip
     (marker,) = by_namespace(decision_markers(decision, STAMP_NS, "map"))["decision"]
     assert marker.text == "STOP: vehicle 17\nsupervisor: OVERRULED"
+
+
+def test_everything_is_compiled_beforehand() -> None:
+    warm_up()
+    signatures = len(assess_into.signatures)
+    shown([[0.0, -30.0, NORTH, 5.0]])
+    assert len(assess_into.signatures) == signatures > 0

@@ -29,6 +29,10 @@ class Settled:
         self._last: tuple[Any, ...] = ()
         self._code: Callable[..., Any] | None = None
 
+    def __reduce__(self) -> tuple[type["Settled"], tuple[Callable[..., Any]]]:
+        """Copy and pickle the way alone: machine code stays where it is, and is found again."""
+        return Settled, (self._kernel,)
+
     def __call__(self, *arguments: Any) -> Any:  # noqa: ANN401 (whatever the kernel takes)
         """Call the kernel."""
         last = self._last

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """A kernel called through `Settled` does what it does when called as it is."""
 
+import copy
+import pickle
 from typing import NamedTuple
 
 import numpy as np
@@ -93,3 +95,11 @@ def test_numbers_of_another_type_are_not_mistaken(pair: Pair) -> None:
 def test_a_plain_function_is_called_as_it_is() -> None:
     settled = Settled(lambda a, b: a + b)
     assert [settled(1, 2), settled(3, 4), settled("a", "b")] == [3, 7, "ab"]
+
+
+def test_it_can_be_copied_and_pickled_after_its_types_are_settled(pair: Pair) -> None:
+    settled = Settled(weighted)
+    for _ in range(3):
+        settled(pair, np.ones(3), 0.5)
+    for again in (copy.deepcopy(settled), pickle.loads(pickle.dumps(settled))):  # noqa: S301
+        assert [again(pair, np.ones(3), 0.5) for _ in range(3)] == [36.0] * 3

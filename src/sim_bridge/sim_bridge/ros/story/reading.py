@@ -9,6 +9,7 @@ import bisect
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -103,14 +104,14 @@ def _events(reader: Reader, topic: str) -> list[Moment | Mark]:
     speeds = [c for c in reader.connections if c.msgtype == ODOMETRY]
     if len({c.topic for c in speeds}) > 1:
         speeds = []  # nobody knows whose they are
-    told = [
+    wanted = [
         c
         for c in reader.connections
         if (c.msgtype == DECISION and c.topic == topic) or c.msgtype == EPISODE
     ]
     events: list[Moment | Mark] = []
     odometry: list[tuple[int, float]] = []
-    for connection, stamp_ns, message in _messages(reader, [*told, *speeds]):
+    for connection, stamp_ns, message in _messages(reader, [*wanted, *speeds]):
         if connection.msgtype == ODOMETRY:
             odometry.append((stamp_ns, float(message.twist.twist.linear.x)))
         elif connection.msgtype == EPISODE:
@@ -118,7 +119,15 @@ def _events(reader: Reader, topic: str) -> list[Moment | Mark]:
         else:
             events.append(_moment(stamp_ns, message))
     odometry.sort()
-    return [_with_speed(e, odometry) if isinstance(e, Moment) else e for e in events]
+    told = [_with_speed(e, odometry) if isinstance(e, Moment) else e for e in events]
+    return [e for _, same in groupby(told, lambda e: e.stamp_ns) for e in sorted(same, key=_rank)]
+
+
+def _rank(event: Moment | Mark) -> int:
+    """Order what bears the same time: an episode starts before its decisions and ends after."""
+    if isinstance(event, Moment):
+        return 1
+    return 0 if event.is_start else 2
 
 
 def _messages(

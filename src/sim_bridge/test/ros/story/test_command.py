@@ -38,7 +38,7 @@ def episode(stamp_ns: int, event: int) -> Stored:
 
 
 DRIVE = (
-    episode(0, EpisodeEvent.STARTED),
+    episode(SECOND, EpisodeEvent.STARTED),
     decision(SECOND, Decision.FAST, "FAST: no conflict within range"),
     decision(3 * SECOND // 2, Decision.FAST, "FAST: no conflict within range"),
     decision(2 * SECOND, Decision.STOP, "STOP: vehicle [17] reaches", 7.0),
@@ -47,7 +47,7 @@ DRIVE = (
 
 
 def write(path: Path, messages: Sequence[Stored]) -> Path:
-    kinds = (topics.EPISODE, topics.ODOMETRY, topics.DECISION)
+    kinds = (topics.ODOMETRY, topics.DECISION, topics.EPISODE)
     with BagWriter(path, kinds, {}) as bag:
         bag.write(messages)
     return path

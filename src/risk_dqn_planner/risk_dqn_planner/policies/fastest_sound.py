@@ -28,6 +28,8 @@ def assumptions_of(config: RuleBasedConfig) -> SafetyAssumptions:
 class FastestSoundPolicy:
     """The fastest admissible action; where there is none, the manoeuvre verified last."""
 
+    chooses_sound = True
+
     def __init__(self, assumptions: SafetyAssumptions | None = None) -> None:
         self._guard = Guard(assumptions)
         self._hash = fingerprint({"policy": self.name} | dataclasses.asdict(self.assumptions))

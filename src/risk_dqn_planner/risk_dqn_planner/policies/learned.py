@@ -65,11 +65,19 @@ class LearnedPolicy:
     def _q_values(self, state: NDArray[np.float32]) -> Floats:
         with torch.inference_mode():
             values = self.network(torch.from_numpy(state)).numpy().astype(np.float64)
-        if not np.isfinite(values).all():
-            raise PolicyError(f"policy {self.name} gives Q values that are not finite")
-        if values.shape != (state.shape[0], len(Action)):
-            raise PolicyError(
-                f"policy {self.name} gives values of shape {values.shape}, "
-                f"expected {(state.shape[0], len(Action))}"
-            )
-        return np.asarray(values)
+        return require_values(self.name, values, state.shape[0])
+
+
+def require_values(name: str, values: Floats, batch: int) -> Floats:
+    """Return what a policy's network gave for a batch, if these are Q values (B, 3).
+
+    Raises:
+        PolicyError: the policy of this name gives something else.
+    """
+    if not np.isfinite(values).all():
+        raise PolicyError(f"policy {name} gives Q values that are not finite")
+    if values.shape != (batch, len(Action)):
+        raise PolicyError(
+            f"policy {name} gives values of shape {values.shape}, expected {(batch, len(Action))}"
+        )
+    return np.asarray(values)

@@ -9,10 +9,11 @@ from pathlib import Path
 from risk_dqn_planner.errors import PolicyError, UnknownPolicyError
 from risk_dqn_planner.policies.base import Action, Policy, StopsAtGoal
 from risk_dqn_planner.policies.constant import ConstantPolicy
-from risk_dqn_planner.policies.fastest_sound import FastestSoundPolicy
+from risk_dqn_planner.policies.fastest_sound import FastestSoundPolicy, assumptions_of
 from risk_dqn_planner.policies.look_ahead import LookAheadPolicy
 from risk_dqn_planner.policies.rule_based import RuleBasedConfig, RuleBasedPolicy
 from risk_dqn_planner.policies.shipped import ShippedPolicy, shipped_policies
+from risk_dqn_planner.safety.assumptions import SafetyAssumptions
 from risk_dqn_planner.state.encoding import StateConfig
 
 PolicyFactory = Callable[[RuleBasedConfig], Policy]
@@ -37,6 +38,7 @@ def load_policy(
     name: str,
     config: RuleBasedConfig | None = None,
     state: StateConfig | None = None,
+    assumptions: SafetyAssumptions | None = None,
 ) -> Policy:
     """Return a policy that stops at the goal.
 
@@ -44,21 +46,23 @@ def load_policy(
     file ("path/to/policy.pt"), or "module:factory", where the factory takes a RuleBasedConfig
     and returns a Policy. config: prediction of Algorithm 1, for the rule itself and for the
     risks shown with any decision. state: what a policy file must have been trained on, by
-    default StateConfig().
+    default StateConfig(). assumptions: what a trained policy rests on that is told which actions
+    are sound, by default those that follow from `config`.
     Raises UnknownPolicyError for a name that is none of these, PolicyFileError for a file that
     cannot be used, PolicyError for a factory that fails.
     """
     config = config or RuleBasedConfig()
     state = state or StateConfig()
+    assumptions = assumptions or assumptions_of(config)
     if name in BUILT_IN:
         policy = BUILT_IN[name](config)
     elif name.endswith(".pt"):
-        policy = _from_file(Path(name), config, state)
+        policy = _from_file(Path(name), config, state, assumptions)
     elif ":" in name:
         policy = _from_factory(name, config)
     else:
         shipped = _shipped(name)
-        policy = _from_file(shipped.path, config, state, shipped)
+        policy = _from_file(shipped.path, config, state, assumptions, shipped)
     return StopsAtGoal(policy)
 
 
@@ -81,7 +85,11 @@ def _shipped(name: str) -> ShippedPolicy:
 
 
 def _from_file(
-    path: Path, config: RuleBasedConfig, state: StateConfig, shipped: ShippedPolicy | None = None
+    path: Path,
+    config: RuleBasedConfig,
+    state: StateConfig,
+    assumptions: SafetyAssumptions,
+    shipped: ShippedPolicy | None = None,
 ) -> Policy:
     # Torch takes seconds to load and is not needed unless a network is asked for.
     from risk_dqn_planner.policies.learned import LearnedPolicy  # noqa: PLC0415
@@ -89,15 +97,18 @@ def _from_file(
         PolicyContract,
         load_policy_file,
     )
+    from risk_dqn_planner.policies.sound_learned import SoundLearnedPolicy  # noqa: PLC0415
 
     expected = PolicyContract(
         name="", state=state, ego=config.risk.ego, decision_period_s=config.decision_period_s
     )
-    if shipped is None:
-        file = load_policy_file(path, expected)
-        return LearnedPolicy(file.module, file.name, file.sha256, state, config)
-    file = load_policy_file(path, expected, shipped.sha256)
-    return LearnedPolicy(file.module, shipped.name, file.sha256, state, config)
+    file = load_policy_file(path, expected, None if shipped is None else shipped.sha256)
+    name = file.name if shipped is None else shipped.name
+    if file.outlook is None:
+        return LearnedPolicy(file.module, name, file.sha256, state, config)
+    return SoundLearnedPolicy(
+        file.module, name, file.sha256, file.outlook, state, config, assumptions
+    )
 
 
 def _from_factory(name: str, config: RuleBasedConfig) -> Policy:

@@ -94,6 +94,8 @@ class LookAheadConfig:
 class LookAheadPolicy:
     """Of the sound actions the first one of the best plan; the guard is that of fastest_sound."""
 
+    chooses_sound = True
+
     def __init__(
         self, assumptions: SafetyAssumptions | None = None, config: LookAheadConfig | None = None
     ) -> None:

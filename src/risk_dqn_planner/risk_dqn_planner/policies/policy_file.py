@@ -21,8 +21,10 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from risk_dqn_planner.errors import PolicyFileError
+from risk_dqn_planner.errors import ConfigurationError, PolicyFileError
 from risk_dqn_planner.policies.base import Action
+from risk_dqn_planner.policies.outlook import LAYOUT as OUTLOOK_LAYOUT
+from risk_dqn_planner.policies.outlook import OutlookConfig
 from risk_dqn_planner.state.encoding import COLUMNS, LAYOUT, ROWS, SCENES, StateConfig
 from risk_dqn_planner.vehicle import EgoLimits
 
@@ -37,6 +39,7 @@ GOLDEN_TOLERANCE = 1e-4
 class PolicyContract:
     """What a policy was trained for.
 
+    outlook: what the network is told beyond the state, None for nothing.
     maps: names of the maps trained on. training: configuration, seed and results as the trainer
     wants them kept, JSON only. git_revision: of the code that trained it.
     """
@@ -48,6 +51,7 @@ class PolicyContract:
     maps: tuple[str, ...] = ()
     training: Mapping[str, Any] = field(default_factory=dict)
     git_revision: str = "unknown"
+    outlook: OutlookConfig | None = None
 
     def requirements(self) -> dict[str, Any]:
         """Return what must be the same where the policy runs."""
@@ -64,26 +68,34 @@ class PolicyContract:
 
 @dataclass(frozen=True)
 class PolicyFile:
-    """A loaded policy file: its network, all that its contract says, and the file's SHA-256."""
+    """A loaded policy file: its network, all that its contract says, and the file's SHA-256.
+
+    outlook: what the network is told beyond the state, None for nothing.
+    """
 
     name: str
     module: torch.jit.ScriptModule
     contract: Mapping[str, Any]
     sha256: str
+    outlook: OutlookConfig | None = None
 
 
 def save_policy(path: Path | str, network: torch.nn.Module, contract: PolicyContract) -> str:
     """Write a policy file and return its SHA-256; the same network gives the same file."""
     scripted = torch.jit.script(copy.deepcopy(network).eval())
-    state = _golden_state()
+    inputs = _golden_inputs(contract.outlook)
+    values = _evaluate(scripted, *inputs.values())
     document = {
         "name": contract.name,
         **contract.requirements(),
         "maps": list(contract.maps),
         "training": dict(contract.training),
         "git_revision": contract.git_revision,
-        "golden": {"state": state.tolist(), "q_values": _evaluate(scripted, state).tolist()},
+        "golden": {name: each.tolist() for name, each in {**inputs, "q_values": values}.items()},
     }
+    if contract.outlook is not None:
+        document["outlook_layout"] = OUTLOOK_LAYOUT
+        document["outlook"] = dataclasses.asdict(contract.outlook)
     text = json.dumps(document, indent=1, sort_keys=True)
     data = _serialise(_without_origin(scripted), {CONTRACT: text})
     Path(path).write_bytes(data)
@@ -115,8 +127,9 @@ def load_policy_file(
     contract = _read_contract(path, files[CONTRACT])
     for name, value in (expected or PolicyContract(name="")).requirements().items():
         _require_equal(path, name, contract.get(name), value)
-    _check_golden(path, module.eval(), contract)
-    return PolicyFile(str(contract["name"]), module, contract, found)
+    outlook = _read_outlook(path, contract)
+    _check_golden(path, module.eval(), contract, outlook)
+    return PolicyFile(str(contract["name"]), module, contract, found, outlook)
 
 
 def _serialise(module: torch.jit.ScriptModule, files: dict[str, str]) -> bytes:
@@ -146,16 +159,38 @@ def _without_origin(module: torch.jit.ScriptModule) -> torch.jit.ScriptModule:
     return _deserialise(stripped.getvalue(), {})
 
 
-def _golden_state() -> NDArray[np.float32]:
-    """Return some states, shape (2, 5, 3, 8), that are nothing in particular."""
-    values = np.random.default_rng(0).uniform(-1.0, 1.0, (2, *STATE_SHAPE))
-    return values.round(4).astype(np.float32)
+def _golden_inputs(outlook: OutlookConfig | None) -> dict[str, NDArray[np.float32]]:
+    """Return some states (2, 5, 3, 8) that are nothing in particular, and outlooks (2, E)."""
+    random = np.random.default_rng(0)
+    shapes = {name: (2, *shape) for name, shape in _input_shapes(outlook).items()}
+    return {
+        name: random.uniform(-1.0, 1.0, shape).round(4).astype(np.float32)
+        for name, shape in shapes.items()
+    }
 
 
-def _evaluate(module: torch.nn.Module, state: NDArray[np.float32]) -> NDArray[np.float32]:
+def _input_shapes(outlook: OutlookConfig | None) -> dict[str, list[int]]:
+    """Return the shape of each input of the network for one situation, in order."""
+    more = {} if outlook is None else {"outlook": [outlook.size]}
+    return {"state": STATE_SHAPE, **more}
+
+
+def _evaluate(module: torch.nn.Module, *inputs: NDArray[np.float32]) -> NDArray[np.float32]:
     with torch.inference_mode():
-        values: NDArray[np.float32] = module(torch.from_numpy(state)).numpy()
+        values: NDArray[np.float32] = module(*map(torch.from_numpy, inputs)).numpy()
         return values
+
+
+def _read_outlook(path: Path | str, contract: Mapping[str, Any]) -> OutlookConfig | None:
+    """Return what the network is told beyond the state, if this program can tell it that."""
+    found = contract.get("outlook")
+    if found is None:
+        return None
+    _require_equal(path, "outlook_layout", contract.get("outlook_layout"), OUTLOOK_LAYOUT)
+    try:
+        return OutlookConfig(**found)
+    except (TypeError, ConfigurationError) as error:
+        raise PolicyFileError(f"policy file {path}: outlook cannot be used: {error}") from error
 
 
 def _read_contract(path: Path | str, text: str | bytes) -> dict[str, Any]:
@@ -180,28 +215,36 @@ def _require_equal(path: Path | str, name: str, value: object, expected: object)
 
 
 def _check_golden(
-    path: Path | str, module: torch.jit.ScriptModule, contract: Mapping[str, Any]
+    path: Path | str,
+    module: torch.jit.ScriptModule,
+    contract: Mapping[str, Any],
+    outlook: OutlookConfig | None,
 ) -> None:
+    shapes = _input_shapes(outlook)
     try:
         golden = contract["golden"]
-        state = np.asarray(golden["state"], dtype=np.float32)
+        inputs = {name: np.asarray(golden[name], dtype=np.float32) for name in shapes}
         expected = np.asarray(golden["q_values"], dtype=np.float32)
     except (KeyError, TypeError, ValueError) as error:
         raise PolicyFileError(
-            f"policy file {path}: {CONTRACT} has no golden state with its q_values"
+            f"policy file {path}: {CONTRACT} has no golden {' and '.join(shapes)} with its q_values"
         ) from error
-    if state.ndim != 4 or list(state.shape[1:]) != STATE_SHAPE:
-        raise PolicyFileError(
-            f"policy file {path}: the golden state has shape {state.shape}, "
-            f"expected (B, {', '.join(map(str, STATE_SHAPE))})"
-        )
+    for name, one in shapes.items():
+        found = inputs[name].shape
+        if len(found) != len(one) + 1 or list(found[1:]) != one:
+            raise PolicyFileError(
+                f"policy file {path}: the golden {name} has shape {found}, "
+                f"expected (B, {', '.join(map(str, one))})"
+            )
     try:
-        values = np.asarray(_evaluate(module, state))
+        values = np.asarray(_evaluate(module, *inputs.values()))
     except (RuntimeError, AttributeError, TypeError) as error:
+        more = "" if outlook is None else f" with outlooks of shape {inputs['outlook'].shape}"
         raise PolicyFileError(
-            f"policy file {path}: the network cannot take states of shape {state.shape}"
+            f"policy file {path}: the network cannot take states of shape "
+            f"{inputs['state'].shape}{more}"
         ) from error
-    shape = (state.shape[0], len(Action))
+    shape = (inputs["state"].shape[0], len(Action))
     if values.shape != shape:
         raise PolicyFileError(
             f"policy file {path}: the network returns shape {values.shape}, expected {shape}"

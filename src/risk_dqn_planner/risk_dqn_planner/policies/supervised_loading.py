@@ -19,6 +19,12 @@ SOUND: Mapping[str, Callable[[SafetyAssumptions], Policy]] = {
 }
 
 
+def is_sound(policy: object) -> bool:
+    """Tell whether a policy chooses among sound actions itself, be it inside of StopsAtGoal."""
+    inside = policy.policy if isinstance(policy, StopsAtGoal) else policy
+    return bool(getattr(inside, "chooses_sound", False))
+
+
 def config_of(assumptions: SafetyAssumptions) -> RuleBasedConfig:
     """Return the default prediction with the vehicles of the assumptions.
 
@@ -43,5 +49,7 @@ def load_supervised(
     assumptions = assumptions or SafetyAssumptions()
     if name in SOUND:
         return StopsAtGoal(SOUND[name](assumptions))
-    policy = load_policy(name, config_of(assumptions))
-    return policy if mode is SupervisorMode.OFF else Supervisor(policy, mode, assumptions)
+    policy = load_policy(name, config_of(assumptions), assumptions=assumptions)
+    if mode is SupervisorMode.OFF or is_sound(policy):
+        return policy
+    return Supervisor(policy, mode, assumptions)

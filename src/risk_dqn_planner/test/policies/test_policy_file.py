@@ -11,7 +11,8 @@ import pytest
 import torch
 
 from risk_dqn_planner.errors import PolicyFileError
-from risk_dqn_planner.policies.network import RiskDqn
+from risk_dqn_planner.policies.network import OutlookDqn, RiskDqn
+from risk_dqn_planner.policies.outlook import OutlookConfig
 from risk_dqn_planner.policies.policy_file import (
     PolicyContract,
     load_policy_file,
@@ -203,3 +204,38 @@ def test_saving_a_network_leaves_it_in_its_mode(tmp_path: Path) -> None:
 def test_the_file_is_small(path: Path) -> None:
     assert path.stat().st_size < 1_000_000
     assert zipfile.is_zipfile(io.BytesIO(path.read_bytes()))
+
+
+OUTLOOK = OutlookConfig(periods=5)
+
+
+@pytest.fixture
+def with_outlook(tmp_path: Path) -> Path:
+    contract = PolicyContract(name="far_sighted", outlook=OUTLOOK)
+    save_policy(tmp_path / "outlook.pt", OutlookDqn(OUTLOOK.size), contract)
+    return tmp_path / "outlook.pt"
+
+
+def test_an_outlook_comes_back_as_it_was_saved(with_outlook: Path, path: Path) -> None:
+    file = load_policy_file(with_outlook)
+    assert file.outlook == OUTLOOK
+    assert file.module(torch.rand(2, 5, 3, 8), torch.rand(2, OUTLOOK.size)).shape == (2, 3)
+    assert load_policy_file(path).outlook is None
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "words"),
+    [
+        ("outlook_layout", "something else", "outlook_layout is something else"),
+        ("outlook", {"periods": 0}, "outlook cannot be used: OutlookConfig.periods is 0"),
+        ("outlook", {"colour": 1}, "outlook cannot be used"),
+        ("outlook", {**vars(OUTLOOK), "periods": 4}, "the golden outlook has shape (2, 19)"),
+    ],
+)
+def test_an_outlook_that_this_program_cannot_give_is_refused(
+    with_outlook: Path, field: str, value: object, words: str
+) -> None:
+    rewritten = Rewritten(with_outlook)
+    rewritten.contract[field] = value
+    rewritten.save()
+    refuses(with_outlook, words)

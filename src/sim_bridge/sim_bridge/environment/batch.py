@@ -7,12 +7,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from risk_dqn_planner.errors import ConfigurationError
 from risk_dqn_planner.policies.base import Action
+from risk_dqn_planner.policies.outlook import Outlook, Views
 from risk_dqn_planner.risk.config import RiskConfig
 from risk_dqn_planner.safety.guard import Guard
 from risk_dqn_planner.safety.joint_check import JointCheck
-from risk_dqn_planner.situation.situations import Booleans
+from risk_dqn_planner.situation.situations import Booleans, Integers
 from risk_dqn_planner.state.history import StateEncoder
+from sim_bridge.environment.advisor import Advisor
 from sim_bridge.environment.interface import EnvironmentStep, Outcome, States
 from sim_bridge.environment.rewards import RewardConfig, rewards
 from sim_bridge.environment.seeds import Seeds, training_seeds
@@ -45,11 +48,15 @@ class BatchEnvironment:
         run_seed: int,
         first: int = 0,
         guard: Guard | None = None,
+        outlook: Outlook | None = None,
+        advisor: Advisor | None = None,
     ) -> None:
         """Take a simulation.
 
         first: number of its first environment among all of the run. guard: tells which actions
-        are sound on what is perceived; with none of them all are.
+        are sound on what is perceived; with none of them all are. outlook: in place of a guard,
+        tells more, which follows the state in what `step` returns. advisor: for `advice`, which
+        needs an outlook.
         """
         self._simulation = simulation
         self._encoder = encoder
@@ -59,12 +66,17 @@ class BatchEnvironment:
         self._first = first
         self._guard = guard
         self._check: JointCheck | None = None
+        self._outlook = outlook
+        self._views: Views | None = None
+        self._advisor = advisor
         self._sound = np.ones((simulation.batch, len(Action)), dtype=np.bool_)
         self._begun = np.zeros(self.batch, dtype=np.int64)
         self._ended = np.zeros(self.batch, dtype=np.bool_)
         self._situations = simulation.situations()
         everywhere = np.ones(self.batch, dtype=np.bool_)
         self._states = encoder.encode(self._situations, everywhere)
+        more = 0 if outlook is None else outlook.config.size
+        self._told = np.empty((self.batch, self._states[0].size + more), dtype=np.float32)
 
     @property
     def batch(self) -> int:
@@ -79,12 +91,22 @@ class BatchEnvironment:
     @property
     def features(self) -> int:
         """How many numbers a state has."""
-        return int(self._states[0].size)
+        return int(self._told.shape[1])
 
     @property
     def sound(self) -> Booleans:
         """Which actions (B, 3) may be taken now: all of them without a guard."""
         return self._sound
+
+    def advice(self) -> Integers:
+        """Return what the adviser would do now (B,).
+
+        Raises:
+            ConfigurationError: there is nobody to ask, or no situation yet.
+        """
+        if self._advisor is None or self._views is None:
+            raise ConfigurationError("advice needs an adviser, an outlook and a first situation")
+        return self._advisor.best_actions(self._situations, self._views)
 
     def reset(self, seeds: Seeds | None = None) -> States:
         """Begin the next episode of each environment, or those of `seeds` (B,).
@@ -101,6 +123,8 @@ class BatchEnvironment:
         begin = self._ended
         if self._guard is not None and self._check is not None:
             self._guard.decided(self._check, actions)
+        if self._outlook is not None and self._views is not None:
+            self._outlook.decided(self._views, actions)
         before = self._manners()
         result = self._simulation.step(actions)
         manners = [now > then for now, then in zip(self._manners(), before, strict=True)]
@@ -138,7 +162,13 @@ class BatchEnvironment:
         if self._guard is not None:
             self._check = self._guard.look(self._situations, restart)
             self._sound = self._guard.sound(self._check)
-        return self._states.reshape(self.batch, -1)
+        states = self._states.reshape(self.batch, -1)
+        if self._outlook is None:
+            return states
+        self._views = self._outlook.look(self._situations, restart)
+        self._sound = self._views.sound
+        np.concatenate((states, self._views.inputs), axis=1, out=self._told)
+        return self._told
 
     def _manners(self) -> list[NDArray[np.int64]]:
         """Return how often (B,) each ego has changed its action and braked hard, if it counts."""
@@ -157,6 +187,7 @@ class BatchEnvironment:
             "begun": self._begun.copy(),
             "ended": self._ended.copy(),
             "guard": copy.deepcopy((self._guard, self._check, self._sound)),
+            "outlook": copy.deepcopy((self._outlook, self._views, self._situations)),
         }
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
@@ -171,3 +202,5 @@ class BatchEnvironment:
         # Nor a guard.
         if "guard" in state:
             self._guard, self._check, self._sound = copy.deepcopy(state["guard"])
+        if "outlook" in state:
+            self._outlook, self._views, self._situations = copy.deepcopy(state["outlook"])

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from risk_dqn_planner.situation.situations import Booleans
+from risk_dqn_planner.situation.situations import Booleans, Integers
 
 States = NDArray[np.float32]
 
@@ -59,6 +59,9 @@ class Environment(Protocol):
     @property
     def sound(self) -> Booleans:
         """Which actions (B, 3) may be taken now: all of them without a supervisor."""
+
+    def advice(self) -> Integers:
+        """Return what an adviser would do now (B,); asked only where the training has one."""
 
     def reset(self) -> States:
         """Begin the first episode of each environment; return the states (B, F)."""

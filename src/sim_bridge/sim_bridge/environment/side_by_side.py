@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from risk_dqn_planner.errors import ConfigurationError
-from risk_dqn_planner.situation.situations import Booleans
+from risk_dqn_planner.situation.situations import Booleans, Integers
 from sim_bridge.environment.interface import Environment, EnvironmentStep, States
 
 
@@ -54,6 +54,10 @@ class SideBySide:
     def sound(self) -> Booleans:
         """Which actions (B, 3) may be taken now."""
         return np.concatenate([part.sound for part in self._parts])
+
+    def advice(self) -> Integers:
+        """Return what the parts' advisers would do now (B,)."""
+        return np.concatenate([part.advice() for part in self._parts])
 
     def reset(self) -> States:
         """Begin the first episode of each environment; return the states (B, F)."""

@@ -17,9 +17,9 @@ from pathlib import Path
 import numpy as np
 
 from risk_dqn_planner.errors import ConfigurationError, PlannerError
-from risk_dqn_planner.policies.learned import LearnedPolicy
-from risk_dqn_planner.policies.policy_file import load_policy_file
+from risk_dqn_planner.policies.loading import load_policy
 from risk_dqn_planner.policies.supervised import Supervisor
+from risk_dqn_planner.policies.supervised_loading import is_sound
 from sim_bridge.environment.episodes import DrivenEpisodes, drive
 from sim_bridge.environment.interface import Outcome
 from sim_bridge.environment.place import Place, load_place
@@ -115,7 +115,7 @@ def _train(run: Run, places: Sequence[Place], folder: Path) -> None:
     files = RunFolder(folder, run)
     if files.finished:
         return
-    session = Session(run, places, initial_weights(run.seed))
+    session = Session(run, places, initial_weights(run.seed, run.outlook_size))
     files.resume(session)
     for _ in session.run():
         files.save(session, every_s=CHECKPOINT_EVERY_S)
@@ -124,10 +124,8 @@ def _train(run: Run, places: Sequence[Place], folder: Path) -> None:
 
 def _drive(run: Run, places: Sequence[Place], policy: Path, episodes: int) -> Figures:
     """Drive test episodes in each cell of the run, under the enforcing supervisor."""
-    file = load_policy_file(policy)
-    supervised = Supervisor(
-        LearnedPolicy(file.module, file.name, file.sha256), assumptions=run.assumptions
-    )
+    learned = load_policy(str(policy), assumptions=run.assumptions)
+    supervised = learned if is_sound(learned) else Supervisor(learned, assumptions=run.assumptions)
     seeds = fixed_seeds(TEST_SEEDS, episodes)
     return figures_of(
         [

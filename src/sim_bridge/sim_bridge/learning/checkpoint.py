@@ -97,6 +97,7 @@ class RunFolder:
             maps=tuple(Path(name).stem for name in self._run.map_names),
             training={**outcome, "versions": versions()},
             git_revision=git_revision(),
+            outlook=session.outlook_config if self._run.config.outlook else None,
         )
         policy = self.path / POLICY
         sha256 = save_policy(policy, network_of(best.weights), contract)

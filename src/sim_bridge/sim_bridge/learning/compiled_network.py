@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The paper's network (risk_dqn_planner.policies.network) and its gradient as compiled loops.
+"""The networks of risk_dqn_planner.policies.network and their gradients as compiled loops.
+
+The paper's, and the one with an outlook of E numbers beside it; E = 0 is the paper's.
 
 The torch module stays the definition: it is what is exported and what runs on the vehicle.
 This is how it is trained, several times faster at the paper's batch of 16; a test holds both
@@ -35,9 +37,18 @@ _EMBEDDING_WEIGHTS = EMBEDDING * (INPUTS + 1)
 _VEHICLE_START = _EMBEDDING_WEIGHTS
 _LANE_START = 2 * _EMBEDDING_WEIGHTS
 _FIRST_START = 3 * _EMBEDDING_WEIGHTS
-_SECOND_START = _FIRST_START + HIDDEN * (JOINED + 1)
-_OUTPUT_START = _SECOND_START + HIDDEN * (HIDDEN + 1)
-WEIGHTS = _OUTPUT_START + ACTIONS * (HIDDEN + 1)
+_BEHIND_FIRST = HIDDEN * (HIDDEN + 1) + ACTIONS * (HIDDEN + 1)
+WEIGHTS = _FIRST_START + HIDDEN * (JOINED + 1) + _BEHIND_FIRST
+
+
+def weights_of(outlook: int) -> int:
+    """Return how many weights a network has that is told so many numbers beyond the state."""
+    return WEIGHTS + HIDDEN * outlook
+
+
+def outlook_of(weights: int) -> int:
+    """Return how many numbers beyond the state a network with so many weights is told."""
+    return (weights - WEIGHTS) // HIDDEN
 
 
 class Layers(NamedTuple):
@@ -55,7 +66,7 @@ class Signals(NamedTuple):
     """What flows through the network for B states, or the loss's derivative by it.
 
     inputs_*: (B, 15), (5B, 15), (2B, 15), a history a row; embedded_*: the same with 20;
-    joined (B, 160); hidden_* (B, 120); q (B, 3).
+    joined (B, 160 + E), with an outlook of E numbers; hidden_* (B, 120); q (B, 3).
     """
 
     inputs_ego: Array
@@ -70,8 +81,8 @@ class Signals(NamedTuple):
     q: Array
 
 
-def empty_signals(batch: int) -> Signals:
-    """Return memory for B states."""
+def empty_signals(batch: int, outlook: int = 0) -> Signals:
+    """Return memory for B states, each with an outlook of so many numbers."""
 
     def zeros(rows: int, columns: int) -> Array:
         return np.zeros((rows, columns), dtype=np.float32)
@@ -84,7 +95,7 @@ def empty_signals(batch: int) -> Signals:
         embedded_ego=zeros(batch, EMBEDDING),
         embedded_vehicle=zeros(vehicles, EMBEDDING),
         embedded_lane=zeros(lanes, EMBEDDING),
-        joined=zeros(batch, JOINED),
+        joined=zeros(batch, JOINED + outlook),
         hidden_first=zeros(batch, HIDDEN),
         hidden_second=zeros(batch, HIDDEN),
         q=zeros(batch, ACTIONS),
@@ -92,21 +103,26 @@ def empty_signals(batch: int) -> Signals:
 
 
 @reordering_kernel
-def layers_of(flat: Array) -> Layers:
-    """Return the layers whose weights, or their derivatives, the flat array (P,) holds."""
+def layers_of(flat: Array, joined: int) -> Layers:
+    """Return the layers whose weights, or their derivatives, the flat array (P,) holds.
+
+    joined: how many inputs h_Q has.
+    """
+    second = _FIRST_START + HIDDEN * (joined + 1)
+    output = second + HIDDEN * (HIDDEN + 1)
     return Layers(
         layer_at(flat, 0, EMBEDDING, INPUTS),
         layer_at(flat, _VEHICLE_START, EMBEDDING, INPUTS),
         layer_at(flat, _LANE_START, EMBEDDING, INPUTS),
-        layer_at(flat, _FIRST_START, HIDDEN, JOINED),
-        layer_at(flat, _SECOND_START, HIDDEN, HIDDEN),
-        layer_at(flat, _OUTPUT_START, ACTIONS, HIDDEN),
+        layer_at(flat, _FIRST_START, HIDDEN, joined),
+        layer_at(flat, second, HIDDEN, HIDDEN),
+        layer_at(flat, output, ACTIONS, HIDDEN),
     )
 
 
 @reordering_kernel
 def split_columns(states: Array, signals: Signals) -> None:
-    """Give each column of the states (B, 5 x 3 x 8) its row of 15 inputs."""
+    """Give each column of the states (B, 5 x 3 x 8, then E) its row of 15 inputs."""
     for row in range(states.shape[0]):
         for i in range(INPUTS):
             values = states[row, i * COLUMNS : (i + 1) * COLUMNS]
@@ -132,6 +148,14 @@ def join_columns(signals: Signals) -> None:
 
 
 @reordering_kernel
+def join_outlook(states: Array, signals: Signals) -> None:
+    """Put the outlook, which follows the states (B, 120 + E), beside the embeddings."""
+    for row in range(states.shape[0]):
+        for j in range(states.shape[1] - FEATURES):
+            signals.joined[row, JOINED + j] = states[row, FEATURES + j]
+
+
+@reordering_kernel
 def part_columns(signals: Signals) -> None:
     """Undo `join_columns`."""
     for row in range(signals.joined.shape[0]):
@@ -147,14 +171,15 @@ def part_columns(signals: Signals) -> None:
 
 @reordering_kernel
 def values(weights: Array, states: Array, signals: Signals) -> None:
-    """Fill the signals for the states (B, 120); `signals.q` (B, 3) holds the Q-values."""
-    layers = layers_of(weights)
+    """Fill the signals for the states (B, 120 + E); `signals.q` (B, 3) holds the Q-values."""
+    layers = layers_of(weights, signals.joined.shape[1])
     split_columns(states, signals)
     forward(signals.inputs_ego, layers.ego, signals.embedded_ego)
     forward(signals.inputs_vehicle, layers.vehicle, signals.embedded_vehicle)
     forward(signals.inputs_lane, layers.lane, signals.embedded_lane)
     join_columns(signals)
     rectify(signals.joined)
+    join_outlook(states, signals)
     forward(signals.joined, layers.first, signals.hidden_first)
     rectify(signals.hidden_first)
     forward(signals.hidden_first, layers.second, signals.hidden_second)
@@ -168,7 +193,8 @@ def gradient(weights: Array, signals: Signals, by: Signals, by_weights: Array) -
 
     signals: as left by `values`; by: memory for the derivatives on the way.
     """
-    layers, out = layers_of(weights), layers_of(by_weights)
+    joined = signals.joined.shape[1]
+    layers, out = layers_of(weights, joined), layers_of(by_weights, joined)
     backward_weights(by.q, signals.hidden_second, out.output)
     backward_input(by.q, layers.output, by.hidden_second)
     rectify_backward(signals.hidden_second, by.hidden_second)

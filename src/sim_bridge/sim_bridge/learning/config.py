@@ -118,12 +118,55 @@ class EvaluationConfig:
 
 
 @dataclass(frozen=True)
+class AdviceConfig:
+    """A slow expert's advice, the look-ahead search's, as one more term of the loss.
+
+    share: of the run in which the expert is asked. until: probability that it drives itself,
+    falling from 1 to 0 over this share of the run, before the learner's states are worth asking
+    about. capacity, batch_size: of the memory of advice. weight, weight_end: of the term, linear
+    over the run. temperature: Q-values that differ by it are told apart. switching_price_s: of the
+    search, higher than where it drives itself, so that it teaches calm.
+    """
+
+    share: float = 1.0
+    until: float = 0.05
+    capacity: int = 500_000
+    batch_size: int = 256
+    weight: float = 1.0
+    weight_end: float = 1.0
+    temperature: float = 0.1
+    switching_price_s: float = 0.5
+
+    def __post_init__(self) -> None:
+        for name in ("share", "until"):
+            value = getattr(self, name)
+            _require(0.0 <= value <= 1.0, f"AdviceConfig.{name}", value, "0 to 1")
+        for name in ("capacity", "batch_size"):
+            value = getattr(self, name)
+            _require(value >= 1, f"AdviceConfig.{name}", value, "at least 1")
+        for name in ("weight", "weight_end", "switching_price_s"):
+            value = getattr(self, name)
+            _require(value >= 0.0, f"AdviceConfig.{name}", value, "0 or more")
+        _require(self.temperature > 0.0, "AdviceConfig.temperature", self.temperature, "above 0")
+
+    def weight_at(self, progress: float) -> float:
+        """Return the term's weight at a share of the run in [0, 1]."""
+        return self.weight + (self.weight_end - self.weight) * progress
+
+    def driving(self, progress: float) -> float:
+        """Return the probability that the expert drives at a share of the run in [0, 1]."""
+        return 0.0 if progress >= self.until else 1.0 - progress / self.until
+
+
+@dataclass(frozen=True)
 class TrainingConfig:
     """One training run, but for its seed, reward, map and scenario.
 
     steps: environment steps in all, over the `environments` stepped side by side; every step
     of the whole batch is followed by `updates_per_step` updates of `batch_size` transitions,
     once `warmup_steps` are in the replay. n_step: rewards summed before bootstrapping.
+    outlook: whether the network is told more than the paper's state, for training under the
+    supervisor. advice: of an expert, None for none.
     """
 
     preset: str = "paper"
@@ -138,6 +181,8 @@ class TrainingConfig:
     exploration: ExplorationConfig = ExplorationConfig()
     learner: LearnerConfig = LearnerConfig()
     evaluation: EvaluationConfig = EvaluationConfig()
+    outlook: bool = False
+    advice: AdviceConfig | None = None
 
     def __post_init__(self) -> None:
         for name in ("steps", "environments", "updates_per_step", "batch_size", "n_step"):
@@ -155,4 +200,10 @@ class TrainingConfig:
             "TrainingConfig.warmup_steps",
             self.warmup_steps,
             f"1 to the replay's capacity, {self.replay.capacity}",
+        )
+        _require(
+            self.advice is None or self.outlook,
+            "TrainingConfig.outlook",
+            self.outlook,
+            "True where there is advice",
         )

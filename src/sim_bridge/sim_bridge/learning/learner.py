@@ -8,8 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from risk_dqn_planner.compiled import reordering_kernel
+from risk_dqn_planner.errors import ConfigurationError
 from sim_bridge.learning import compiled_network as network
-from sim_bridge.learning.compiled_network import Signals, empty_signals
+from sim_bridge.learning.advice import Advice, advice_loss
+from sim_bridge.learning.compiled_network import Signals, empty_signals, outlook_of
 from sim_bridge.learning.config import LearnerConfig
 from sim_bridge.learning.dense import Adam, Array, adam_step, mix, shorten
 from sim_bridge.learning.losses import (
@@ -80,6 +82,29 @@ def _update(
     return loss
 
 
+@reordering_kernel
+def _follow(
+    weights: Weights,
+    rates: Rates,
+    advice: Advice,
+    weight: float,
+    temperature: float,
+    now: Signals,
+    by: Signals,
+) -> float:
+    """Make one step towards advice (K,), and return the loss before it."""
+    network.values(weights.online, advice.states, now)
+    loss = advice_loss(now.q, advice.sound, advice.action, temperature, by.q)
+    by.q[:] = by.q * np.float32(weight)
+    network.gradient(weights.online, now, by, weights.gradient)
+    if rates.max_gradient_norm < math.inf:
+        shorten(weights.gradient, rates.max_gradient_norm)
+    adam_step(
+        weights.online, weights.gradient, weights.adam, rates.learning_rate, rates.adam_epsilon
+    )
+    return loss
+
+
 class Learner:
     """Online and target network with the optimiser of the online one."""
 
@@ -92,8 +117,10 @@ class Learner:
             adam=Adam(np.zeros_like(weights), np.zeros_like(weights), np.zeros(1, np.int64)),
             gradient=np.zeros_like(weights),
         )
-        self._work = _workspace(0)
-        self._signals = empty_signals(0)
+        self._outlook = outlook_of(len(weights))
+        self._work = _workspace(0, self._outlook)
+        self._signals = empty_signals(0, self._outlook)
+        self._of_advice = (empty_signals(0, self._outlook), empty_signals(0, self._outlook))
 
     @property
     def weights(self) -> Array:
@@ -101,9 +128,18 @@ class Learner:
         return self._weights.online
 
     def q_values(self, states: Array) -> Array:
-        """Return Q-values (B, 3) of the online network for flat states (B, 120), reused memory."""
+        """Return Q-values (B, 3) of the online network for flat states (B, F), reused memory.
+
+        Raises:
+            ConfigurationError: the network takes states of another size.
+        """
+        if states.shape[1] != network.FEATURES + self._outlook:
+            raise ConfigurationError(
+                f"states have {states.shape[1]} numbers, "
+                f"expected {network.FEATURES + self._outlook}"
+            )
         if self._signals.q.shape[0] != states.shape[0]:
-            self._signals = empty_signals(states.shape[0])
+            self._signals = empty_signals(states.shape[0], self._outlook)
         network.values(self._weights.online, states, self._signals)
         return self._signals.q
 
@@ -113,16 +149,29 @@ class Learner:
         `progress` is the share of the run that is over, for the learning rate.
         """
         if self._work.errors.shape != sample.weights.shape:
-            self._work = _workspace(sample.weights.shape[0])
+            self._work = _workspace(sample.weights.shape[0], self._outlook)
+        rates = self._rates(progress)
+        loss = _update(self._weights, rates, sample.transitions, sample.weights, self._work)
+        return self._work.errors, loss
+
+    def follow(self, advice: Advice, weight: float, temperature: float, progress: float) -> float:
+        """Make one step towards an expert's actions; return the loss, as in `advice_loss`."""
+        count = len(advice.action)
+        if self._of_advice[0].q.shape[0] != count:
+            now, by = empty_signals(count, self._outlook), empty_signals(count, self._outlook)
+            self._of_advice = (now, by)
+        rates = self._rates(progress)
+        loss: float = _follow(self._weights, rates, advice, weight, temperature, *self._of_advice)
+        return loss
+
+    def _rates(self, progress: float) -> Rates:
         config = self._config
-        rates = Rates(
+        return Rates(
             learning_rate=config.rate(progress),
             adam_epsilon=config.adam_epsilon,
             target_rate=config.target_rate,
             max_gradient_norm=config.max_gradient_norm or math.inf,
         )
-        loss = _update(self._weights, rates, sample.transitions, sample.weights, self._work)
-        return self._work.errors, loss
 
     def state_dict(self) -> dict[str, Any]:
         """Return everything that `load_state_dict` needs to go on identically."""
@@ -144,11 +193,11 @@ class Learner:
         }
 
 
-def _workspace(batch: int) -> Workspace:
+def _workspace(batch: int, outlook: int) -> Workspace:
     return Workspace(
-        now=empty_signals(batch),
-        next_online=empty_signals(batch),
-        next_target=empty_signals(batch),
-        by=empty_signals(batch),
+        now=empty_signals(batch, outlook),
+        next_online=empty_signals(batch, outlook),
+        next_target=empty_signals(batch, outlook),
+        by=empty_signals(batch, outlook),
         errors=np.zeros(batch, dtype=np.float32),
     )

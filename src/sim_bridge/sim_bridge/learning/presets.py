@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Training presets: the paper's own numbers, and two of ours.
+"""Training presets: the paper's own numbers, and three of ours.
 
-`tuned` gets to the same success sooner; `supervised` is for training under the supervisor.
+`tuned` gets to the same success sooner; `supervised` is for training under the supervisor, and
+`advised` for that with an outlook and an expert.
 `paper` is the paper's Table I and its text to the letter. What the paper leaves open:
 optimiser (Adam), exploration, exponents of the prioritised replay, when learning starts; these
 are the defaults of config.py.
@@ -9,6 +10,7 @@ are the defaults of config.py.
 
 from risk_dqn_planner.errors import ConfigurationError
 from sim_bridge.learning.config import (
+    AdviceConfig,
     EvaluationConfig,
     ExplorationConfig,
     LearnerConfig,
@@ -71,6 +73,30 @@ PRESETS = {
         evaluation=EvaluationConfig(
             every_episodes=2_000, episodes=20, validation_every=3, validation_episodes=2_000
         ),
+    ),
+    # The expert knows the way: little is left to be explored.
+    "advised": TrainingConfig(
+        preset="advised",
+        steps=1_500_000,
+        environments=128,
+        updates_per_step=2,
+        batch_size=256,
+        warmup_steps=5_000,
+        gamma=0.99,
+        n_step=5,
+        replay=ReplayConfig(capacity=200_000),
+        exploration=ExplorationConfig(start=0.05, end=0.01, share=0.5),
+        learner=LearnerConfig(
+            learning_rate=1e-3,
+            learning_rate_end=3e-5,
+            target_rate=0.01,
+            max_gradient_norm=10.0,
+        ),
+        evaluation=EvaluationConfig(
+            every_episodes=4_000, episodes=20, validation_every=2, validation_episodes=2_000
+        ),
+        outlook=True,
+        advice=AdviceConfig(),
     ),
 }
 

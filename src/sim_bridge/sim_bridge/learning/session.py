@@ -15,6 +15,8 @@ import numpy as np
 
 from risk_dqn_planner.errors import ConfigurationError
 from risk_dqn_planner.policies.base import Policy
+from risk_dqn_planner.policies.look_ahead import LookAheadConfig
+from risk_dqn_planner.policies.outlook import Outlook, OutlookConfig
 from risk_dqn_planner.policies.supervised import Supervisor, SupervisorMode, supervisor_mode
 from risk_dqn_planner.risk.config import RiskConfig
 from risk_dqn_planner.safety.assumptions import SafetyAssumptions
@@ -22,6 +24,7 @@ from risk_dqn_planner.safety.guard import Guard
 from risk_dqn_planner.situation.config import INSTANTANEOUS, require_memory
 from risk_dqn_planner.state.encoding import StateConfig
 from risk_dqn_planner.state.history import StateEncoder
+from sim_bridge.environment.advisor import Advisor
 from sim_bridge.environment.batch import BatchEnvironment
 from sim_bridge.environment.episodes import DrivenEpisodes, drive
 from sim_bridge.environment.interface import Environment, Outcome
@@ -29,7 +32,7 @@ from sim_bridge.environment.place import Place
 from sim_bridge.environment.rewards import reward_named
 from sim_bridge.environment.seeds import VALIDATION_SEEDS, fixed_seeds
 from sim_bridge.environment.side_by_side import SideBySide, shares_of
-from sim_bridge.learning.config import TrainingConfig
+from sim_bridge.learning.config import AdviceConfig, TrainingConfig
 from sim_bridge.learning.dense import Array
 from sim_bridge.learning.greedy import GreedyPolicy
 from sim_bridge.learning.learner import Learner
@@ -63,11 +66,21 @@ class Run:
                 "supervisor is 'report', which changes nothing in training, "
                 "expected one of: off, enforce"
             )
+        if self.config.outlook and not self.supervised:
+            raise ConfigurationError(
+                f"supervisor is '{self.supervisor}', expected enforce for preset "
+                f"{self.config.preset}, whose network is told which actions are sound"
+            )
 
     @property
     def supervised(self) -> bool:
         """Whether the supervisor enforces sound actions."""
         return supervisor_mode(self.supervisor) is SupervisorMode.ENFORCE
+
+    @property
+    def outlook_size(self) -> int:
+        """How many numbers the network is told beyond the paper's state."""
+        return OutlookConfig().size if self.config.outlook else 0
 
     def description(self) -> dict[str, Any]:
         """Return all of it as JSON; what is not used is left out.
@@ -82,6 +95,10 @@ class Run:
             del found["memory"]
         if self.config.exploration.repeat == 0.0:
             del found["config"]["exploration"]["repeat"]
+        if not self.config.outlook:
+            del found["config"]["outlook"]
+        if self.config.advice is None:
+            del found["config"]["advice"]
         return found
 
     @property
@@ -173,6 +190,7 @@ class Session:
         """
         self.run_description = run
         self.state_config = StateConfig()
+        self.outlook_config = OutlookConfig()
         courses = [(place, load_scenario(name)) for place in places for name in run.scenarios]
         self.decision_period_s = courses[0][1].timing.decision_period_s
         evaluation = run.config.evaluation
@@ -188,6 +206,7 @@ class Session:
         run = self.run_description
         parts: list[BatchEnvironment] = []
         for simulation in _simulations(courses, run.config.environments, run.memory):
+            advice = run.config.advice
             part = BatchEnvironment(
                 simulation=simulation,
                 encoder=StateEncoder(self.state_config),
@@ -195,10 +214,25 @@ class Session:
                 risk=RiskConfig(),
                 run_seed=run.seed,
                 first=sum(part.batch for part in parts),
-                guard=Guard(run.assumptions) if run.supervised else None,
+                guard=Guard(run.assumptions) if run.supervised and not self._looks else None,
+                outlook=self._outlook(),
+                advisor=None if advice is None else self._advisor(advice),
             )
             parts.append(part)
         return SideBySide(parts) if len(parts) > 1 else parts[0]
+
+    @property
+    def _looks(self) -> bool:
+        """Whether the network is told more than the paper's state."""
+        return self.run_description.config.outlook
+
+    def _outlook(self) -> Outlook | None:
+        run = self.run_description
+        return Outlook(run.assumptions, self.outlook_config) if self._looks else None
+
+    def _advisor(self, advice: AdviceConfig) -> Advisor:
+        config = LookAheadConfig(switching_price_s=advice.switching_price_s)
+        return Advisor(self.run_description.assumptions, config)
 
     @property
     def last_weights(self) -> Array:
@@ -239,9 +273,10 @@ class Session:
 
     def policy(self) -> Policy:
         """Return the greedy policy, supervised as in the run; it goes on learning with the run."""
-        policy = GreedyPolicy(self._learner, StateEncoder(self.state_config))
-        run = self.run_description
-        return Supervisor(policy, assumptions=run.assumptions) if run.supervised else policy
+        run, encoder = self.run_description, StateEncoder(self.state_config)
+        policy = GreedyPolicy(self._learner, encoder, self._outlook())
+        supervised = run.supervised and not self._looks
+        return Supervisor(policy, assumptions=run.assumptions) if supervised else policy
 
     def _score(self, simulations: Sequence[Simulation]) -> Score:
         policy = self.policy()

@@ -140,7 +140,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         if folder.finished:
             console.print(f"{out} is trained already; delete it to train again")
             return 0
-        session = Session(run, places, initial_weights(arguments.seed))
+        session = Session(run, places, initial_weights(run.seed, run.outlook_size))
         if folder.resume(session):
             console.print(f"resuming {out} at {session.progress:.0%}")
         _train(session, folder, console)

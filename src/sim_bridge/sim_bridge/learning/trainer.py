@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from risk_dqn_planner.policies.base import Action
 from sim_bridge.environment.interface import Environment, Outcome
-from sim_bridge.learning.config import TrainingConfig
+from sim_bridge.learning.advice import Advice, AdviceMemory
+from sim_bridge.learning.config import AdviceConfig, TrainingConfig
 from sim_bridge.learning.learner import Learner
 from sim_bridge.learning.n_step import NStepReturns
 from sim_bridge.learning.replay import PrioritizedReplay, Transitions
@@ -48,9 +49,14 @@ class Trainer:
         self._returns = NStepReturns(
             environment.batch, config.n_step, config.gamma, environment.features
         )
+        self._advice: AdviceMemory | None = None
+        if config.advice is not None:
+            self._advice = AdviceMemory(config.advice, environment.features, seed)
         self._random = np.random.default_rng([seed, 1])
         self._states = environment.reset().copy()
         self._sound = environment.sound.copy()
+        # Where an episode has ended there is nothing to choose.
+        self._over = np.zeros(environment.batch, dtype=np.bool_)
         # Where the last action was a random one, and which.
         self._explored = np.zeros(environment.batch, dtype=np.bool_)
         self._drawn = np.zeros(environment.batch, dtype=np.int64)
@@ -90,6 +96,7 @@ class Trainer:
         self._replay.add(self._returns.push(single, step.taken, ended))
         self._states[:] = step.states
         self._sound[:] = sound
+        self._over[:] = ended
         taken = int(step.taken.sum())
         self._steps += taken
         self._ended += np.bincount(step.outcome, minlength=len(Outcome))
@@ -102,6 +109,8 @@ class Trainer:
         """Choose epsilon-greedily for each environment, among the sound actions alone."""
         batch = self._environment.batch
         explore = self._random.random(batch) < self._config.exploration.epsilon(self.progress)
+        if self._config.advice is not None:
+            return self._choose_advised(self._config.advice, explore)
         actions = self._any_actions()
         if self._config.exploration.repeat > 0.0:
             actions, explore = self._repeated(actions, explore)
@@ -110,6 +119,20 @@ class Trainer:
         values = self._learner.q_values(self._states)
         greedy = np.where(self._sound, values, -np.inf).argmax(axis=1)
         return np.where(explore, actions, greedy)
+
+    def _choose_advised(
+        self, config: AdviceConfig, explore: NDArray[np.bool_]
+    ) -> NDArray[np.int64]:
+        """Ask the expert, remember the answers, and choose; at first it often drives itself."""
+        progress, batch = self.progress, self._environment.batch
+        greedy = np.where(self._sound, self._learner.q_values(self._states), -np.inf).argmax(axis=1)
+        if self._advice is not None and progress <= config.share:
+            advised = self._environment.advice()
+            asked = (self._sound.sum(axis=1) > 1) & ~self._over
+            self._advice.add(Advice(self._states[asked], self._sound[asked], advised[asked]))
+            driving = self._random.random(batch) < config.driving(progress)
+            greedy = np.where(driving, advised, greedy)
+        return np.where(explore, self._any_actions(), greedy)
 
     def _any_actions(self) -> NDArray[np.int64]:
         """Draw a sound action for each environment, all of them with equal chances."""
@@ -136,6 +159,11 @@ class Trainer:
         )
         errors, loss = self._learner.update(drawn, self.progress)
         self._replay.update_priorities(drawn.indices, errors)
+        if self._advice is not None and self._config.advice is not None and len(self._advice):
+            config, progress = self._config.advice, self.progress
+            weight = config.weight_at(progress)
+            if weight > 0.0:
+                self._learner.follow(self._advice.sample(), weight, config.temperature, progress)
         self._updates += 1
         self._loss_sum += loss
         self._loss_count += 1
@@ -171,6 +199,8 @@ class Trainer:
             "states": self._states.copy(),
             "sound": self._sound.copy(),
             "random_actions": (self._explored.copy(), self._drawn.copy()),
+            "advice": None if self._advice is None else self._advice.state_dict(),
+            "over": self._over.copy(),
             "counts": (self._steps, self._episodes, self._updates, self._reports),
         }
 
@@ -186,5 +216,9 @@ class Trainer:
         self._sound[:] = state.get("sound", True)
         if "random_actions" in state:
             self._explored, self._drawn = (array.copy() for array in state["random_actions"])
+        # Nor any advice.
+        if self._advice is not None:
+            self._advice.load_state_dict(state["advice"])
+        self._over[:] = state.get("over", False)
         self._steps, self._episodes, self._updates, self._reports = state["counts"]
         self._restart_report()

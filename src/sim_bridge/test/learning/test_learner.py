@@ -7,7 +7,8 @@ import torch
 from numpy.typing import NDArray
 from torch.nn.utils import parameters_to_vector, vector_to_parameters
 
-from risk_dqn_planner.policies.network import RiskDqn
+from risk_dqn_planner.errors import ConfigurationError
+from risk_dqn_planner.policies.network import OutlookDqn, RiskDqn
 from sim_bridge.learning import compiled_network
 from sim_bridge.learning.compiled_network import FEATURES, empty_signals
 from sim_bridge.learning.config import LearnerConfig
@@ -161,3 +162,29 @@ def test_values_of_a_terminal_batch_converge_to_its_rewards() -> None:
     for _ in range(300):
         last = learner.update(drawn, progress=0.0)[1]
     assert last < 1e-3 * first
+
+
+def test_a_network_with_an_outlook_is_that_of_the_torch_module_too() -> None:
+    outlook, count = 7, 21
+    torch.manual_seed(0)
+    module = OutlookDqn(outlook)
+    weights = flat(list(module.parameters()))
+    more = np.random.default_rng(8).uniform(-1, 1, (count, outlook)).astype(np.float32)
+    by_q = np.random.default_rng(5).normal(size=(count, 3)).astype(np.float32)
+    q = module(as_tensor(states(count)), torch.from_numpy(more))
+    expected = torch.autograd.grad(q, list(module.parameters()), torch.from_numpy(by_q))
+    told = np.concatenate((states(count), more), axis=1)
+    signals, by = empty_signals(count, outlook), empty_signals(count, outlook)
+    compiled_network.values(weights, told, signals)
+    np.testing.assert_allclose(signals.q, q.detach().numpy(), rtol=1e-4, atol=1e-6)
+    by.q[:] = by_q
+    found = np.empty_like(weights)
+    compiled_network.gradient(weights, signals, by, found)
+    np.testing.assert_allclose(found, flat(list(expected)), rtol=1e-3, atol=1e-5)
+    assert len(weights) == compiled_network.weights_of(outlook)
+    assert compiled_network.outlook_of(len(weights)) == outlook
+
+
+def test_states_of_another_size_are_refused() -> None:
+    with pytest.raises(ConfigurationError, match="states have 127 numbers, expected 120"):
+        Learner(LearnerConfig(), initial_weights(0)).q_values(np.zeros((2, 127), dtype=np.float32))

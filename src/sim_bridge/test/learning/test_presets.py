@@ -39,6 +39,6 @@ def test_numbers_out_of_range_are_refused_by_name() -> None:
 
 def test_an_unknown_preset_is_refused_by_name() -> None:
     with pytest.raises(
-        ConfigurationError, match="no preset 'fast', expected one of: paper, supervised"
+        ConfigurationError, match="no preset 'fast', expected one of: advised, paper"
     ):
         preset_named("fast")

@@ -8,6 +8,7 @@ from risk_dqn_planner.policies.fastest_sound import FastestSoundPolicy
 from risk_dqn_planner.policies.loading import load_policy
 from risk_dqn_planner.policies.look_ahead import LookAheadPolicy
 from risk_dqn_planner.policies.supervised import Supervisor
+from risk_dqn_planner.policies.supervised_loading import is_sound as chooses_sound
 from risk_dqn_planner.safety.assumptions import SafetyAssumptions
 from sim_bridge.evaluation.rollout import Contestant, PolicyContestant
 from sim_bridge.evaluation.soundness.cells import FASTEST_SOUND, LOOK_AHEAD, SOUND
@@ -45,6 +46,8 @@ class Drivers:
         if name.endswith(_SUPERVISED):
             policy = self._policy(name.removesuffix(_SUPERVISED))
             return PolicyContestant(Supervisor(policy, assumptions=assumptions), name=name)
+        if chooses_sound(self._policy(name)):
+            return PolicyContestant(load_policy(name, assumptions=assumptions))
         return PolicyContestant(self._policy(name))
 
     def _policy(self, name: str) -> Policy:

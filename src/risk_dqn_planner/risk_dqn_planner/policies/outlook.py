@@ -1,0 +1,179 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a network is told beyond the paper's state: what is sound, and what waiting would bring.
+
+    action in force | sound actions | margins of going on after each action | forecast
+    3, one is 1     | 3, 0 or 1     | 3                                     | 2 x K
+
+The margins are the joint check's, if the ego goes on through everything after the action; the
+forecast is that of going after k periods of Stop, and of Slow. The same object serves a batch in
+training and a batch of one on the vehicle; rows are independent.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from risk_dqn_planner.compiled import kernel
+from risk_dqn_planner.errors import ConfigurationError
+from risk_dqn_planner.policies.foresight.forecast import WAYS_TO_WAIT, forecast
+from risk_dqn_planner.policies.foresight.sight import SightLines
+from risk_dqn_planner.policies.foresight.task import SearchNumbers, Task, Work, work_for
+from risk_dqn_planner.safety.assumptions import SafetyAssumptions, SafetyNumbers
+from risk_dqn_planner.safety.course import begin_course
+from risk_dqn_planner.safety.guard import Guard
+from risk_dqn_planner.safety.joint_check import ACTIONS, JointCheck, foresee, judge, target_of
+from risk_dqn_planner.situation.situations import Booleans, Floats, Integers, Situations
+
+Inputs = NDArray[np.float32]
+
+LAYOUT = "action in force (3), sound (3), margins of going (3), of going later (Stop, Slow) x K"
+_IN_FORCE, _SOUND, _GOING, _LATER = 0, ACTIONS, 2 * ACTIONS, 3 * ACTIONS
+
+
+@dataclass(frozen=True)
+class OutlookConfig:
+    """periods: K, how many decisions the forecast looks ahead.
+
+    most_s: margins are divided by it, and cut off at -1 and 1. nearest_corner_m: what hides a
+    lane ends at least this far before its centreline, as in the look-ahead search.
+    """
+
+    periods: int = 8
+    most_s: float = 4.0
+    nearest_corner_m: float = 2.5
+
+    def __post_init__(self) -> None:
+        if self.periods < 1:
+            raise ConfigurationError(f"OutlookConfig.periods is {self.periods}, expected 1 or more")
+        if not 0.0 < self.most_s < math.inf:
+            raise ConfigurationError(
+                f"OutlookConfig.most_s is {self.most_s}, expected a finite number above 0"
+            )
+        if not 0.0 <= self.nearest_corner_m < math.inf:
+            raise ConfigurationError(
+                f"OutlookConfig.nearest_corner_m is {self.nearest_corner_m}, "
+                "expected a finite number, 0 or more"
+            )
+
+    @property
+    def size(self) -> int:
+        """How many numbers there are for each situation."""
+        return _LATER + WAYS_TO_WAIT * self.periods
+
+
+class Views(NamedTuple):
+    """What one look at B situations found.
+
+    inputs (B, E): for the network. sound (B, 3); check: the joint check. in_force (B,): the action
+    before; reacted_m, corner_m (B, M): as the look-ahead search takes them.
+    """
+
+    inputs: Inputs
+    sound: Booleans
+    check: JointCheck
+    in_force: Integers
+    reacted_m: Floats
+    corner_m: Floats
+
+
+class Outlook:
+    """The joint check with its memory, and the forecast. Call `look`, choose, call `decided`."""
+
+    def __init__(
+        self, assumptions: SafetyAssumptions | None = None, config: OutlookConfig | None = None
+    ) -> None:
+        self.config = config or OutlookConfig()
+        self._guard = Guard(assumptions)
+        self._sight = SightLines(self.config.nearest_corner_m)
+        self._work = self._room(0, 0)
+
+    @property
+    def assumptions(self) -> SafetyAssumptions:
+        """What is called sound rests on them."""
+        return self._guard.assumptions
+
+    def look(self, situations: Situations, restart: Booleans) -> Views:
+        """Look at B situations; `restart` (B,) marks where what was seen before is void."""
+        check = self._guard.look(situations, restart)
+        ahead = self._work.ahead
+        shape = situations.vehicle_mask.shape[1], situations.lane_mask.shape[1]
+        if shape != (ahead.vehicle_mask.shape[1], ahead.lane_mask.shape[1]):
+            self._work = self._room(*shape)
+        views = Views(
+            inputs=np.empty((len(restart), self.config.size), dtype=np.float32),
+            sound=self._guard.sound(check),
+            check=check,
+            in_force=self._guard.in_force,
+            reacted_m=self._guard.reacted_m,
+            corner_m=self._sight.corner_m(situations, restart),
+        )
+        look_into(
+            situations,
+            self.assumptions.numbers(),
+            _numbers(self.config),
+            self.config.most_s,
+            views.reacted_m,
+            views.corner_m,
+            views.sound,
+            views.in_force,
+            self._work,
+            views.inputs,
+        )
+        return views
+
+    def decided(self, views: Views, action: Integers) -> None:
+        """Take note of the actions (B,) that will be carried out."""
+        self._guard.decided(views.check, action)
+
+    def _room(self, vehicles: int, lanes: int) -> Work:
+        return work_for(_numbers(self.config), self.assumptions.numbers(), vehicles, lanes)
+
+
+def _numbers(config: OutlookConfig) -> SearchNumbers:
+    """Return as many decisions as the forecast has; nothing is searched, so the rest is idle."""
+    return SearchNumbers(
+        decisions=config.periods + 1, cell_m=1.0, cell_mps=1.0, switching_s=0.0, gap_price=0.0
+    )
+
+
+@kernel
+def look_into(
+    s: Situations,
+    p: SafetyNumbers,
+    c: SearchNumbers,
+    most_s: float,
+    reacted_m: Floats,
+    corner_m: Floats,
+    sound: Booleans,
+    in_force: Integers,
+    w: Work,
+    inputs: Inputs,
+) -> None:
+    """Fill the inputs (B, E) row by row."""
+    lanes, periods = s.lane_mask.shape[1], c.decisions - 1
+    arrival_s, who = np.empty(lanes), np.empty(lanes, dtype=np.int64)
+    later_s = np.empty((WAYS_TO_WAIT, periods))
+    for row in range(s.ego_speed_mps.shape[0]):
+        foresee(s, row, p, arrival_s, who)
+        now_mps = max(s.ego_speed_mps[row], 0.0)
+        before_mps = target_of(in_force[row], p)
+        for action in range(ACTIONS):
+            course = begin_course(now_mps, before_mps, target_of(action, p), p)
+            going = judge(s, row, course, arrival_s, who, reacted_m, p)
+            inputs[row, _IN_FORCE + action] = 1.0 if in_force[row] == action else 0.0
+            inputs[row, _SOUND + action] = 1.0 if sound[row, action] else 0.0
+            inputs[row, _GOING + action] = share_of(going.margin_s, most_s)
+        forecast(Task(s, row, p, c, reacted_m, corner_m, sound, in_force), periods, w, later_s)
+        for action in range(WAYS_TO_WAIT):
+            for k in range(periods):
+                at = _LATER + action * periods + k
+                inputs[row, at] = share_of(later_s[action, k], most_s)
+
+
+@kernel
+def share_of(margin_s: float, most_s: float) -> float:
+    """Map a margin to [-1, 1]."""
+    return max(-1.0, min(margin_s / most_s, 1.0))

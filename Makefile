@@ -36,7 +36,7 @@ TUNED := --preset tuned --reward collision --steps 3000000 --name tuned \
   --map four_way,t_junction,multi_lane,roundabout \
   --scenario base,dense_traffic,severe_occlusion,close_small_obstacle
 
-.PHONY: help setup demo test replay bags maps train trainings evaluate ship bench shell format lint types check clean distclean
+.PHONY: help setup demo test replay bags convert maps train trainings evaluate ship bench shell format lint types check clean distclean
 
 help: ## list the targets
 	@echo 'make TARGET, where TARGET is one of'
@@ -55,8 +55,15 @@ replay: ## feed a bag to the real nodes and compare decisions: BAG=bags/...
 	@$(if $(BAG),,echo 'error: say which bag, for example make replay BAG=bags/four_way' >&2; exit 2)
 	@$(WITH_ROS) $(SIMULATION)/replay '$(BAG)' $(ARGS)
 
-bags: ## record the bags in bags/ again
-	@$(WITH_ROS) $(SIMULATION)/record $(ARGS)
+bags: ## record the bags anew; UPDATE=1 keeps their inputs; changed decisions need a REASON='...' [BAG]
+	@$(WITH_ROS) $(SIMULATION)/$(if $(UPDATE),update_bags $(if $(BAG),'$(BAG)'),record \
+	  $(call option,--bag,BAG)) $(call option,--reason,REASON) $(ARGS)
+
+convert: ## make a bag of another stack into one to replay: BAG=recorded/bag OUT=new/bag [MAP ROUTE ...]
+	@$(if $(and $(BAG),$(OUT)),,echo 'error: say which, for example make convert BAG=recorded OUT=new' >&2; exit 2)
+	@$(WITH_ROS) $(SIMULATION)/convert '$(BAG)' '$(OUT)' $(call option,--map,MAP) \
+	  $(call option,--route,ROUTE) $(call option,--origin,ORIGIN) \
+	  $(call option,--projector,PROJECTOR) $(call option,--policy,POLICY) $(ARGS)
 
 maps: ## draw the project's own maps again
 	@$(WITH_ROS) $(SIMULATION)/draw_maps $(ARGS)

@@ -43,6 +43,7 @@ setup(
     zip_safe=False,
     entry_points={
         "console_scripts": [
+            "convert = sim_bridge.ros.convert:main",
             "demo = sim_bridge.ros.demo:main",
             "draw_maps = sim_bridge.maps.draw:main",
             "evaluate = sim_bridge.evaluation.evaluate:main",
@@ -52,6 +53,7 @@ setup(
             "simulator_node = sim_bridge.ros.simulator_node:main",
             "story = sim_bridge.ros.story.command:main",
             "train = sim_bridge.learning.train:main",
+            "update_bags = sim_bridge.ros.update_bags:main",
         ],
     },
 )

@@ -6,8 +6,11 @@ from dataclasses import dataclass
 from intersection_msgs.msg import Decision
 
 from risk_dqn_planner.decision import Action, Reason
+from risk_dqn_planner.faults import FaultyInput
 from risk_dqn_planner.policies.base import Supervision
 from risk_dqn_planner.ros.conversions import SECOND_NS, to_ns
+
+NOTHING_IN_TIME = "no decision in time"
 
 
 @dataclass(frozen=True)
@@ -18,38 +21,39 @@ class Difference:
     now: Decision | None
 
     def __str__(self) -> str:
-        time_s = to_ns(self.recorded.header.stamp) / SECOND_NS
-        now = _describe(self.now) if self.now is not None else "no decision in time"
-        return f"t = {time_s:.1f} s: recorded {_describe(self.recorded)}; now {now}"
+        now = NOTHING_IN_TIME if self.now is None else _with_text(self.now)
+        return f"t = {time_of(self.recorded)} s: recorded {_with_text(self.recorded)}; now {now}"
 
 
-def _describe(decision: Decision) -> str:
-    critical = ""
+def time_of(decision: Decision) -> str:
+    """Return when a decision was taken, in seconds with one digit."""
+    return f"{to_ns(decision.header.stamp) / SECOND_NS:.1f}"
+
+
+def described(decision: Decision) -> str:
+    """Return everything about a decision that must not change, in one line."""
+    parts = [Action(decision.action).name, Reason(decision.reason).name]
+    if decision.faulty_input != Decision.NO_INPUT:
+        parts.append(f"of {FaultyInput(decision.faulty_input)}")
     if decision.critical_vehicle_id != Decision.NO_ID:
-        critical += f", vehicle {decision.critical_vehicle_id}"
+        parts.append(f"vehicle {decision.critical_vehicle_id}")
     if decision.critical_lane_id != Decision.NO_ID:
-        critical += f", lane {decision.critical_lane_id}"
+        parts.append(f"lane {decision.critical_lane_id}")
     if decision.supervisor != Decision.SUPERVISOR_OFF:
         verdict, proposed = Supervision(decision.supervisor).name, Action(decision.proposed).name
-        critical += f", {proposed} {verdict}"
-    action, reason = Action(decision.action).name, Reason(decision.reason).name
-    return f"{action} ({reason}{critical}: {decision.text})"
+        parts.append(f"{proposed} {verdict}")
+    return ", ".join(parts)
 
 
-def same(recorded: Decision, now: Decision) -> bool:
-    """Whether two decisions do the same for the same reason."""
-    return bool(
-        recorded.action == now.action
-        and recorded.reason == now.reason
-        and recorded.critical_vehicle_id == now.critical_vehicle_id
-        and recorded.critical_lane_id == now.critical_lane_id
-        and recorded.supervisor == now.supervisor
-        and recorded.proposed == now.proposed
-    )
+def _with_text(decision: Decision) -> str:
+    return f"{described(decision)} ({decision.text})"
 
 
 def difference(recorded: Decision, now: Decision | None) -> Difference | None:
-    """Return how a decision differs from the recorded one, None if it does not."""
-    if now is not None and same(recorded, now):
+    """Return how a decision differs from the recorded one, None if it does not.
+
+    The text is left out: its numbers may differ in their last digits.
+    """
+    if now is not None and described(recorded) == described(now):
         return None
     return Difference(recorded, now)

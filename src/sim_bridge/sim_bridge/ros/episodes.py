@@ -27,6 +27,8 @@ class EpisodePlayer:
         """Play the episode of a seed until it ends, after a pause that ends the one before."""
         start_ns = self._now_ns + EPISODE_GAP_NS
         start_ns = -(-start_ns // DECISION_PERIOD_NS) * DECISION_PERIOD_NS
+        # The route is a new errand; the planner takes note of it while time passes.
+        self._publisher.publish_route(simulation, start_ns)
         self._pacing.pause(self._now_ns, start_ns)
         simulation.reset([seed])
         self._now_ns = start_ns
@@ -38,8 +40,8 @@ class EpisodePlayer:
         result: StepResult | None = None
         late = 0
         while self._go_on():
-            self._publisher.publish_frame(simulation, seed, self._now_ns)
-            self._pacing.reach(self._now_ns)
+            complete = self._publisher.publish_frame(simulation, seed, self._now_ns)
+            self._pacing.reach(self._now_ns, complete=complete)
             decision = self._pacing.decision(self._now_ns)
             if result is not None and (result.terminated[0] or result.truncated[0]):
                 self._publisher.publish_end(simulation, seed, self._now_ns, result, late)

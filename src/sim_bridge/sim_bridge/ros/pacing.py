@@ -20,6 +20,8 @@ from sim_bridge.ros.planner_link import DECISION_PERIOD_NS, PlannerLink
 OLDEST_DECISION_S = 1.0
 # Nodes read /clock best effort: a lost time is sent again while an answer to it is awaited.
 _CLOCK_AGAIN_S = 0.1
+# Where nothing is awaited, nodes get this much time to see the clock and say so.
+_NOTICE_S = 0.03
 _PAUSE_STEP_NS = SECOND_NS // 10
 
 
@@ -46,8 +48,11 @@ class WallPace:
 class Pacing(Protocol):
     """How simulated time and the planner's answers are tied together."""
 
-    def reach(self, stamp_ns: int) -> None:
-        """Let simulated time reach the frame whose inputs have just been published."""
+    def reach(self, stamp_ns: int, *, complete: bool = True) -> None:
+        """Let simulated time reach the frame whose inputs have just been published.
+
+        complete: whether the objects were among them, so that there will be a situation.
+        """
 
     def decision(self, stamp_ns: int) -> Decision | None:
         """Return the decision to obey from this time on, None if there is no valid one."""
@@ -68,12 +73,20 @@ class LockStep:
         self._timeout_s = timeout_s
         self._held: Decision | None = None
         self._answered = True
+        self._complete = True
 
-    def reach(self, stamp_ns: int) -> None:
+    def reach(self, stamp_ns: int, *, complete: bool = True) -> None:
         """Wait for the situation of the frame, then let the clock show the frame's time.
 
-        While there is no answer, only frames that need a decision are waited for.
+        While there is no answer, only frames that need a decision are waited for. Without
+        objects there is no situation to wait for, but the nodes get time to notice that.
         """
+        self._complete = complete
+        if not complete:
+            self._pace.reach(stamp_ns)
+            self._link.tick(stamp_ns)
+            time.sleep(_NOTICE_S)
+            return
         needed = stamp_ns % DECISION_PERIOD_NS == 0
         timeout_s = self._timeout_s if needed or self._answered else 0.0
         self._answered = self._link.situations.wait(stamp_ns, timeout_s) is not None
@@ -81,13 +94,13 @@ class LockStep:
         self._link.tick(stamp_ns)
 
     def decision(self, stamp_ns: int) -> Decision | None:
-        """Wait for the decision taken at this time on the situation of this time.
+        """Wait for the decision taken at this time on the situation of this time, if there is one.
 
         Between multiples of the period the last one holds.
         """
         if stamp_ns % DECISION_PERIOD_NS == 0:
             found = self._await_decision(stamp_ns)
-            late = found is None or to_ns(found.situation_stamp) != stamp_ns
+            late = found is None or (self._complete and to_ns(found.situation_stamp) != stamp_ns)
             self._held = None if late else found
         return self._held
 
@@ -120,7 +133,7 @@ class RealTime:
         self._link = link
         self._pace = pace
 
-    def reach(self, stamp_ns: int) -> None:
+    def reach(self, stamp_ns: int, *, complete: bool = True) -> None:  # noqa: ARG002
         """Let the clock show the frame's time when it is due."""
         self._pace.reach(stamp_ns)
         self._link.tick(stamp_ns)

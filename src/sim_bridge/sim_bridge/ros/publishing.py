@@ -9,6 +9,7 @@ from risk_dqn_planner.ros import conversions
 from risk_dqn_planner.situation.inputs import EgoPose, ObjectArrays
 from sim_bridge.perception.poses import VehiclePoses
 from sim_bridge.ros import topics
+from sim_bridge.ros.input_loss import InputLoss
 from sim_bridge.ros.transform import TransformPublisher
 from sim_bridge.simulation.simulation import Simulation, StepResult
 
@@ -71,8 +72,10 @@ def ground_truth(
 class FramePublisher:
     """Publishes simulations of a batch of one on the simulator's topics."""
 
-    def __init__(self, node: Node, map_frame: str) -> None:
+    def __init__(self, node: Node, map_frame: str, loss: InputLoss) -> None:
         self._frame = map_frame
+        self._loss = loss
+        self._start_ns = 0
         self._transform = TransformPublisher(node)
         self._publishers = {
             topic.name: node.create_publisher(topic.message, topic.ends[_NODE], topic.qos)
@@ -87,8 +90,11 @@ class FramePublisher:
     def _send(self, topic: topics.Topic, message: object) -> None:
         self._publishers[topic.name].publish(message)
 
-    def publish_frame(self, simulation: Simulation, seed: int, stamp_ns: int) -> None:
-        """Publish everything about one moment; the objects complete the planner's inputs."""
+    def publish_frame(self, simulation: Simulation, seed: int, stamp_ns: int) -> bool:
+        """Publish everything about one moment; the objects complete the planner's inputs.
+
+        Returns whether they were sent, so that the planner answers.
+        """
         ego = EgoPose(*simulation.ego_poses()[0].tolist())
         poses = simulation.vehicle_poses()
         size = simulation.model.traffic_dimensions
@@ -98,12 +104,20 @@ class FramePublisher:
         odometry = conversions.ego_to_message(ego, stamp_ns, self._frame)
         self._send(topics.GROUND_TRUTH, truth)
         self._transform.publish(odometry)
-        self._send(topics.ODOMETRY, odometry)
-        self._send(topics.VISIBLE_AREA, conversions.area_to_message(area, stamp_ns, self._frame))
-        self._send(topics.OBJECTS, conversions.objects_to_message(seen, stamp_ns, self._frame))
+        inputs = (
+            (topics.ODOMETRY, odometry),
+            (topics.VISIBLE_AREA, conversions.area_to_message(area, stamp_ns, self._frame)),
+            (topics.OBJECTS, conversions.objects_to_message(seen, stamp_ns, self._frame)),
+        )
+        since_ns = stamp_ns - self._start_ns
+        for topic, message in inputs:
+            if not self._loss.silences(topic.name, since_ns):
+                self._send(topic, message)
+        return not self._loss.silences(topics.OBJECTS.name, since_ns)
 
     def publish_start(self, simulation: Simulation, seed: int, stamp_ns: int) -> None:
-        """Announce an episode, and the route through it."""
+        """Announce an episode."""
+        self._start_ns = stamp_ns
         self._send(
             topics.EPISODE,
             EpisodeEvent(
@@ -113,10 +127,9 @@ class FramePublisher:
                 event=EpisodeEvent.STARTED,
             ),
         )
-        self.publish_route(simulation, stamp_ns)
 
     def publish_route(self, simulation: Simulation, stamp_ns: int) -> None:
-        """Publish the ego's route; it stays for whoever comes later."""
+        """Publish the ego's route, a new errand; it stays for whoever comes later."""
         route = conversions.route_to_message(simulation.model.route, stamp_ns, self._frame)
         self._send(topics.ROUTE, route)
 

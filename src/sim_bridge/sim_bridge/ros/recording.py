@@ -34,8 +34,10 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
 from risk_dqn_planner.errors import BagError
+from risk_dqn_planner.ros.adapters.config import AdapterConfig
 from risk_dqn_planner.ros.conversions import SECOND_NS
-from sim_bridge.ros.topics import Topic
+from sim_bridge.ros.foreign import ForeignObjects, is_foreign
+from sim_bridge.ros.topics import OBJECTS, Topic
 
 _INFINITE = QosTime(2147483647, 4294967295)
 
@@ -145,35 +147,51 @@ class Bag:
         return [message for message in self.messages if message.topic == topic.name]
 
 
-def _check_types(path: Path, connections: Sequence[Connection], topics: Sequence[Topic]) -> None:
+def _check_types(path: Path, connections: Sequence[Connection], names: Mapping[str, Topic]) -> None:
     types = installed_types()
-    for topic in topics:
-        found = [c for c in connections if c.topic == topic.name]
+    for name, topic in names.items():
+        found = [c for c in connections if c.topic == name]
         if not found:
-            raise BagError(f"{path} lacks the topic {topic.name}")
+            raise BagError(f"{path} lacks the topic {name}")
+        if topic is OBJECTS and is_foreign(found[0].msgtype):
+            continue
         if found[0].msgtype != topic.type_name:
-            raise BagError(
-                f"{topic.name} in {path} is {found[0].msgtype}, expected {topic.type_name}"
-            )
+            raise BagError(f"{name} in {path} is {found[0].msgtype}, expected {topic.type_name}")
         if found[0].digest and found[0].digest != types.hash_rihs01(topic.type_name):
             raise BagError(
                 f"{path} was recorded with another version of {topic.type_name}, record it anew"
             )
 
 
-def read_bag(path: Path, topics: Sequence[Topic]) -> Bag:
-    """Read the given topics of a bag.
+def read_bag(
+    path: Path,
+    topics: Sequence[Topic],
+    adapters: AdapterConfig | None = None,
+    names: Mapping[str, str] | None = None,
+) -> Bag:
+    """Read the given topics of a bag; objects of another stack's type are made into own ones.
+
+    names: by the own name of a topic its name in the bag, where that differs.
 
     Raises:
         BagError: the bag is missing, unreadable, lacks a topic or has it with another type.
     """
-    names = {topic.name for topic in topics}
+    own = {(names or {}).get(topic.name, topic.name): topic for topic in topics}
     try:
         with Reader(path) as reader:
-            _check_types(path, reader.connections, topics)
-            wanted = [c for c in reader.connections if c.topic in names]
+            _check_types(path, reader.connections, own)
+            wanted = [c for c in reader.connections if c.topic in own]
+            foreign = {
+                c.id: ForeignObjects(path, c, adapters or AdapterConfig())
+                for c in wanted
+                if is_foreign(c.msgtype)
+            }
             messages = [
-                Stored(stamp_ns, connection.topic, bytes(data))
+                Stored(
+                    stamp_ns,
+                    own[connection.topic].name,
+                    foreign[connection.id].own(data) if connection.id in foreign else bytes(data),
+                )
                 for connection, stamp_ns, data in reader.messages(wanted)
             ]
             custom = reader.storage.metadata.custom

@@ -54,6 +54,13 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 2
     except KeyboardInterrupt:
         return 130
+    if result.compared == 0:
+        print(
+            f"replay: {arguments.bag} holds no decisions to compare with; "
+            "update_bags adds those that are taken now",
+            file=sys.stderr,
+        )
+        return 2
     for found in result.differences:
         print(found)
     same = result.compared - len(result.differences)

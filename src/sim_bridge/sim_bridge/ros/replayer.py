@@ -16,9 +16,9 @@ from risk_dqn_planner.errors import BagError, ConfigurationError
 from sim_bridge.ros.comparison import Difference, difference
 from sim_bridge.ros.node_group import NodeGroup
 from sim_bridge.ros.pacing import LockStep, WallPace
-from sim_bridge.ros.planner_link import EPISODE_GAP_NS, PlannerLink
+from sim_bridge.ros.planner_link import DECISION_PERIOD_NS, EPISODE_GAP_NS, PlannerLink
 from sim_bridge.ros.process import ParameterValue
-from sim_bridge.ros.recording import Stored, read_bag
+from sim_bridge.ros.recording import Bag, Stored, read_bag
 from sim_bridge.ros.run_settings import from_notes
 from sim_bridge.ros.session import SilentPlannerError, ros_session, wait_until
 from sim_bridge.ros.topics import DECISION, INPUTS, OBJECTS, ROUTE, SITUATION
@@ -30,30 +30,36 @@ _ANSWER_S = 5.0
 
 @dataclass(frozen=True)
 class Frame:
-    """The inputs of one time, and the decision that was taken on them, if one was."""
+    """The inputs of one time."""
 
     stamp_ns: int
     inputs: list[Stored] = field(default_factory=list)
-    decision: Decision | None = None
+
+    @property
+    def complete(self) -> bool:
+        """Whether objects are among them, so that there will be a situation."""
+        return any(message.topic == OBJECTS.name for message in self.inputs)
 
 
 def frames(messages: Sequence[Stored]) -> Iterator[Frame]:
-    """Group a bag's messages by time; decisions taken without inputs are left out."""
-    ordered = sorted(messages, key=lambda message: message.stamp_ns)
+    """Group a bag's inputs by time."""
+    inputs = [message for message in messages if message.topic != DECISION.name]
+    ordered = sorted(inputs, key=lambda message: message.stamp_ns)
     for stamp_ns, group in groupby(ordered, key=lambda message: message.stamp_ns):
         parts = list(group)
-        inputs = [m for topic in INPUTS for m in parts if m.topic == topic.name]
-        decisions = [m for m in parts if m.topic == DECISION.name]
-        if not any(m.topic == OBJECTS.name for m in inputs):
-            continue
-        decision = deserialize_message(decisions[-1].data, Decision) if decisions else None
-        yield Frame(stamp_ns, inputs, decision)
+        yield Frame(stamp_ns, [m for topic in INPUTS for m in parts if m.topic == topic.name])
 
 
 @dataclass(frozen=True)
 class Replayed:
-    """What came of a replay: how many decisions were compared, and those that differ."""
+    """What came of a replay: the bag, the decisions taken now, and what differs.
 
+    decisions: at each time at which one was due, None where none came in time. compared: how many
+    decisions are recorded.
+    """
+
+    bag: Bag
+    decisions: Mapping[int, Decision | None]
     compared: int
     differences: list[Difference]
 
@@ -90,19 +96,30 @@ class Replayer:
             if (message.topic == ROUTE.name) is routes:
                 self._publishers[message.topic].publish(message.data)
 
-    def play(self, recorded: Sequence[Frame]) -> Iterator[tuple[Decision, Decision | None]]:
-        """Yield each recorded decision with the one that is taken now on the same inputs."""
+    def play(self, recorded: Sequence[Frame]) -> Iterator[tuple[int, Decision | None]]:
+        """Yield the time [ns] of each decision that is due, and the decision."""
         before_ns: int | None = None
         for frame in recorded:
             self._send(frame, routes=True)
-            # After the warm-up there is a pause too, as there was before the recording.
-            gap_from_ns = frame.stamp_ns - EPISODE_GAP_NS if before_ns is None else before_ns
-            self._pacing.pause(gap_from_ns, frame.stamp_ns)
+            if before_ns is None:
+                # After the warm-up there is a pause too, as there was before the recording.
+                self._pacing.pause(frame.stamp_ns - EPISODE_GAP_NS, frame.stamp_ns)
+                before_ns = frame.stamp_ns - 1
+            yield from self._decisions_between(before_ns, frame.stamp_ns)
             self._send(frame, routes=False)
-            self._pacing.reach(frame.stamp_ns)
-            if frame.decision is not None:
-                yield frame.decision, self._pacing.decision(frame.stamp_ns)
+            self._pacing.reach(frame.stamp_ns, complete=frame.complete)
+            if frame.stamp_ns % DECISION_PERIOD_NS == 0:
+                yield frame.stamp_ns, self._pacing.decision(frame.stamp_ns)
             before_ns = frame.stamp_ns
+
+    def _decisions_between(
+        self, before_ns: int, until_ns: int
+    ) -> Iterator[tuple[int, Decision | None]]:
+        """Yield the decisions that fall between two frames."""
+        first_ns = (before_ns // DECISION_PERIOD_NS + 1) * DECISION_PERIOD_NS
+        for stamp_ns in range(first_ns, until_ns, DECISION_PERIOD_NS):
+            self._pacing.reach(stamp_ns, complete=False)
+            yield stamp_ns, self._pacing.decision(stamp_ns)
 
 
 def replay(path: Path, overrides: Mapping[str, ParameterValue], log_folder: Path) -> Replayed:
@@ -113,19 +130,24 @@ def replay(path: Path, overrides: Mapping[str, ParameterValue], log_folder: Path
     """
     bag = read_bag(path, (*INPUTS, DECISION))
     recorded = list(frames(bag.messages))
-    if not any(frame.decision for frame in recorded):
-        raise BagError(f"{path} holds no decision that was taken on inputs, nothing to compare")
+    if not any(frame.complete for frame in recorded):
+        raise BagError(f"{path} holds no objects, nothing to decide on")
     commands = from_notes(path, bag.notes, overrides).planner_commands()
+    now: dict[int, Decision | None] = {}
     with ros_session("replay") as node, NodeGroup(commands, log_folder) as planner:
         replayer = Replayer(node)
         replayer.meet_planner(planner.check)
         _refuse_unknown(node, overrides, planner.check)
-        pairs = []
-        for pair in replayer.play(recorded):
+        for stamp_ns, decision in replayer.play(recorded):
             planner.check()
-            pairs.append(pair)
-    found = [difference(before, now) for before, now in pairs]
-    return Replayed(len(pairs), [d for d in found if d is not None])
+            now[stamp_ns] = decision
+    return _compared(bag, now)
+
+
+def _compared(bag: Bag, now: Mapping[int, Decision | None]) -> Replayed:
+    before = {m.stamp_ns: deserialize_message(m.data, Decision) for m in bag.of(DECISION)}
+    found = [difference(decision, now.get(stamp_ns)) for stamp_ns, decision in before.items()]
+    return Replayed(bag, now, len(before), [d for d in found if d is not None])
 
 
 def _refuse_unknown(node: Node, names: Iterable[str], check: Callable[[], None]) -> None:

@@ -13,6 +13,7 @@ from risk_dqn_planner.policies.shipped import DEFAULT_POLICY, DEFAULT_SUPERVISOR
 from risk_dqn_planner.policies.supervised import supervisor_mode
 from risk_dqn_planner.situation.config import SituationConfig, require_memory
 from sim_bridge.maps import map_names, shipped_map
+from sim_bridge.ros.input_loss import InputLoss
 from sim_bridge.ros.process import NodeCommand, ParameterValue
 from sim_bridge.ros.topics import remappings
 from sim_bridge.scenarios.loading import load_scenario
@@ -32,7 +33,7 @@ class RunSettings:
 
     map_name: name of an own map or path of another. supervisor, memory: parameters of the policy
     and of the situation node. overrides: other parameters of these nodes that differ from their
-    defaults.
+    defaults. loss: an input that the simulator does not send for a while.
     """
 
     map_name: str
@@ -45,9 +46,10 @@ class RunSettings:
     supervisor: str = DEFAULT_SUPERVISOR
     memory: str = DEFAULT_MEMORY
     overrides: Mapping[str, ParameterValue] = field(default_factory=dict)
+    loss: InputLoss = field(default_factory=InputLoss)
 
     def notes(self) -> dict[str, str]:
-        """Texts from which `from_notes` builds the same settings."""
+        """Texts from which `from_notes` builds the same settings, but for a loss of input."""
         return {
             "map": self.map_name,
             "route": ",".join(str(lanelet_id) for lanelet_id in self.route),
@@ -57,6 +59,7 @@ class RunSettings:
             "scenario": self.scenario,
             "supervisor": self.supervisor,
             "memory": self.memory,
+            **({"loss": self.loss.note()} if self.loss.input else {}),
         }
 
     def _map_parameters(self) -> dict[str, ParameterValue]:
@@ -103,6 +106,9 @@ class RunSettings:
             "real_time_factor": real_time_factor,
             "lockstep": True,
             "autostart": False,
+            "loss.input": self.loss.input,
+            "loss.after_s": self.loss.after_s,
+            "loss.for_s": self.loss.for_s,
         }
         return NodeCommand("sim_bridge", "simulator_node", parameters, remappings("simulator"))
 

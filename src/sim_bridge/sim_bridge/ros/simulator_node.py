@@ -15,6 +15,7 @@ from risk_dqn_planner.ros.main import run
 from risk_dqn_planner.ros.parameters import MapParameters, declare
 from sim_bridge.ros.building import SimulationShelf
 from sim_bridge.ros.episodes import EpisodePlayer
+from sim_bridge.ros.input_loss import InputLoss
 from sim_bridge.ros.pacing import LockStep, RealTime, WallPace
 from sim_bridge.ros.planner_link import PlannerLink
 from sim_bridge.ros.publishing import FramePublisher
@@ -39,7 +40,8 @@ class SimulatorNode(Node):
         self._config = declare(self, SimulatorParameters)
         self._shelf = SimulationShelf(maps.load(), declare_route(self))
         first = self._shelf.get(self._config.scenario)
-        self._publisher = FramePublisher(self, maps.map_frame)
+        loss = declare(self, InputLoss, prefix="loss.")
+        self._publisher = FramePublisher(self, maps.map_frame, loss)
         self._publisher.publish_route(first, 0)
         self._link = PlannerLink(self, "~/input/situation", "~/input/decision")
         self._requests: queue.SimpleQueue[_Request | None] = queue.SimpleQueue()

@@ -25,7 +25,7 @@ def test_a_difference_says_when_what_and_why() -> None:
         critical_lane_id=11,
     )
     assert str(difference(before, now)) == (
-        "t = 12.5 s: recorded FAST (CLEAR: free); now STOP (VEHICLE, vehicle 7, lane 11: it comes)"
+        "t = 12.5 s: recorded FAST, CLEAR (free); now STOP, VEHICLE, vehicle 7, lane 11 (it comes)"
     )
 
 
@@ -37,6 +37,13 @@ def test_another_reason_or_vehicle_is_a_difference() -> None:
     assert difference(before, other_vehicle) is not None
 
 
+def test_another_input_at_fault_is_a_difference_and_named() -> None:
+    before = decision(action=Decision.STOP, reason=Decision.STALE_INPUT, faulty_input=1)
+    other = decision(action=Decision.STOP, reason=Decision.STALE_INPUT, faulty_input=3)
+    assert "STOP, STALE_INPUT, of odometry ()" in str(difference(before, other))
+    assert "STOP, STALE_INPUT, of objects ()" in str(difference(before, other))
+
+
 def test_another_verdict_of_the_supervisor_is_a_difference_and_named() -> None:
     before = decision(action=Decision.FAST, proposed=Decision.FAST, text="free")
     overruled = decision(
@@ -46,7 +53,7 @@ def test_another_verdict_of_the_supervisor_is_a_difference_and_named() -> None:
         text="gone",
     )
     assert str(difference(before, overruled)) == (
-        "t = 12.5 s: recorded FAST (CLEAR: free); now FAST (CLEAR, SLOW OVERRULED: gone)"
+        "t = 12.5 s: recorded FAST, CLEAR (free); now FAST, CLEAR, SLOW OVERRULED (gone)"
     )
 
 

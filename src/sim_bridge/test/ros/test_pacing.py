@@ -83,6 +83,17 @@ def test_in_lock_step_a_planner_that_stays_silent_is_waited_for_only_so_long() -
     assert pacing.decision(DECISION_PERIOD_NS) is None
 
 
+def test_in_lock_step_nothing_is_waited_for_that_cannot_come() -> None:
+    link = FakeLink()
+    pacing = LockStep(link, WallPace(0.0), LONG_S)
+    started = time.monotonic()
+    # Without objects there is no situation, and the decision is taken on an earlier one.
+    link.answers = {DECISION_PERIOD_NS: [decision(DECISION_PERIOD_NS, 300_000_000)]}
+    pacing.reach(DECISION_PERIOD_NS, complete=False)
+    assert pacing.decision(DECISION_PERIOD_NS) == decision(DECISION_PERIOD_NS, 300_000_000)
+    assert time.monotonic() - started < LONG_S / 2
+
+
 def test_in_lock_step_only_a_decision_on_the_present_situation_counts() -> None:
     link = FakeLink()
     pacing = LockStep(link, WallPace(0.0), 0.5)

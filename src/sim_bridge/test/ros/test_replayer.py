@@ -21,15 +21,15 @@ def test_messages_of_one_time_make_a_frame_whose_objects_come_last() -> None:
     assert len(found) == 1
     assert found[0].stamp_ns == 500
     assert [m.topic for m in found[0].inputs] == ["/route", "/odometry", "/objects"]
-    assert found[0].decision is not None
+    assert found[0].complete
 
 
-def test_frames_come_in_the_order_of_time_and_need_no_decision() -> None:
-    found = list(frames([stored(topics.OBJECTS, 700), stored(topics.OBJECTS, 200)]))
-    assert [(frame.stamp_ns, frame.decision) for frame in found] == [(200, None), (700, None)]
+def test_frames_come_in_the_order_of_time_and_some_lack_their_objects() -> None:
+    found = list(frames([stored(topics.ODOMETRY, 700), stored(topics.OBJECTS, 200)]))
+    assert [(frame.stamp_ns, frame.complete) for frame in found] == [(200, True), (700, False)]
 
 
-def test_a_decision_that_was_taken_without_inputs_is_left_out() -> None:
+def test_decisions_alone_make_no_frame() -> None:
     assert list(frames([stored(topics.DECISION, 500)])) == []
 
 

@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 import argparse
+from dataclasses import replace
 
 import pytest
 
 from risk_dqn_planner.errors import BagError, ConfigurationError, MapFileError
 from risk_dqn_planner.policies.shipped import DEFAULT_POLICY
+from sim_bridge.ros.input_loss import InputLoss
 from sim_bridge.ros.run_settings import (
     RunSettings,
     add_run_arguments,
@@ -84,3 +86,15 @@ def test_supervisor_and_memory_reach_the_node_that_they_belong_to() -> None:
     situation, policy = (command.parameters for command in commands)
     assert (situation.get("memory"), situation.get("supervisor")) == ("tracked", None)
     assert (policy.get("memory"), policy.get("supervisor")) == (None, "report")
+
+
+def test_a_loss_of_input_is_noted_and_handed_to_the_simulator() -> None:
+    settings = replace(own_map_settings(), loss=InputLoss("objects", 6.0, 3.0))
+    assert settings.notes()["loss"] == "objects,6,3"
+    given = settings.simulator_command(0.0).parameters
+    assert (given["loss.input"], given["loss.after_s"], given["loss.for_s"]) == (
+        "objects",
+        6.0,
+        3.0,
+    )
+    assert "loss" not in own_map_settings().notes()

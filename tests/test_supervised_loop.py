@@ -86,7 +86,7 @@ def test_what_is_overruled_is_said_with_what_was_proposed(tmp_path: Path) -> Non
     for decision in map(decision_from_message, decisions):
         overruled = decision.supervision is Supervision.OVERRULED
         assert overruled == (decision.action is not Action.FAST)
-        assert overruled == ("the supervisor overrules FAST; " in decision.text)
+        assert overruled == ("supervisor overrules FAST; " in decision.text)
         if overruled:
             assert decision.reason in {Reason.VEHICLE, Reason.HIDDEN_VEHICLE}
             assert decision.critical_lane_id is not None

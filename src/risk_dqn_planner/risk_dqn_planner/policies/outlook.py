@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a network is told beyond the paper's state: what is sound, and what waiting would bring.
 
-    action in force | sound actions | margins of going on after each action | forecast
-    3, one is 1     | 3, 0 or 1     | 3                                     | 2 x K
+    action in force | sound actions | margins of going on after each action | next place | forecast
+    3, one is 1     | 3, 0 or 1     | 3                                     | 4          | 3 x K
 
 The margins are the joint check's, if the ego goes on through everything after the action; the
-forecast is that of going after k periods of Stop, and of Slow. The same object serves a batch in
-training and a batch of one on the vehicle; rows are independent.
+forecast is that of going after k periods of waiting, in three ways. The next place is where the
+ego can wait: the way to the next zone, to the place, through the zones behind it, and whether it
+joins a lane there. The same object serves a batch in training and a batch of one on the vehicle;
+rows are independent.
 """
 
 import math
@@ -18,7 +20,7 @@ from numpy.typing import NDArray
 
 from risk_dqn_planner.compiled import kernel
 from risk_dqn_planner.errors import ConfigurationError
-from risk_dqn_planner.policies.foresight.forecast import WAYS_TO_WAIT, forecast
+from risk_dqn_planner.policies.foresight.forecast import WAYS_TO_WAIT, Place, forecast, next_place
 from risk_dqn_planner.policies.foresight.sight import SightLines
 from risk_dqn_planner.policies.foresight.task import SearchNumbers, Task, Work, work_for
 from risk_dqn_planner.safety.assumptions import SafetyAssumptions, SafetyNumbers
@@ -29,29 +31,37 @@ from risk_dqn_planner.situation.situations import Booleans, Floats, Integers, Si
 
 Inputs = NDArray[np.float32]
 
-LAYOUT = "action in force (3), sound (3), margins of going (3), of going later (Stop, Slow) x K"
-_IN_FORCE, _SOUND, _GOING, _LATER = 0, ACTIONS, 2 * ACTIONS, 3 * ACTIONS
+LAYOUT = (
+    "action in force (3), sound (3), margins of going (3), next place (free, rest, zones, joins), "
+    "margins of going after k periods of (Stop, Slow, coming nearer)"
+)
+_IN_FORCE, _SOUND, _GOING, _PLACE = 0, ACTIONS, 2 * ACTIONS, 3 * ACTIONS
+_LATER = _PLACE + 4
 
 
 @dataclass(frozen=True)
 class OutlookConfig:
     """periods: K, how many decisions the forecast looks ahead.
 
-    most_s: margins are divided by it, and cut off at -1 and 1. nearest_corner_m: what hides a
+    most_s: margins are divided by it, and cut off at -1 and 1. most_m: the same for ways, of
+    which the root is taken, and through zones for half of it. nearest_corner_m: what hides a
     lane ends at least this far before its centreline, as in the look-ahead search.
     """
 
     periods: int = 8
     most_s: float = 4.0
+    most_m: float = 40.0
     nearest_corner_m: float = 2.5
 
     def __post_init__(self) -> None:
         if self.periods < 1:
             raise ConfigurationError(f"OutlookConfig.periods is {self.periods}, expected 1 or more")
-        if not 0.0 < self.most_s < math.inf:
-            raise ConfigurationError(
-                f"OutlookConfig.most_s is {self.most_s}, expected a finite number above 0"
-            )
+        for name in ("most_s", "most_m"):
+            if not 0.0 < getattr(self, name) < math.inf:
+                raise ConfigurationError(
+                    f"OutlookConfig.{name} is {getattr(self, name)}, "
+                    "expected a finite number above 0"
+                )
         if not 0.0 <= self.nearest_corner_m < math.inf:
             raise ConfigurationError(
                 f"OutlookConfig.nearest_corner_m is {self.nearest_corner_m}, "
@@ -115,6 +125,7 @@ class Outlook:
             self.assumptions.numbers(),
             _numbers(self.config),
             self.config.most_s,
+            self.config.most_m,
             views.reacted_m,
             views.corner_m,
             views.sound,
@@ -145,6 +156,7 @@ def look_into(
     p: SafetyNumbers,
     c: SearchNumbers,
     most_s: float,
+    most_m: float,
     reacted_m: Floats,
     corner_m: Floats,
     sound: Booleans,
@@ -166,7 +178,10 @@ def look_into(
             inputs[row, _IN_FORCE + action] = 1.0 if in_force[row] == action else 0.0
             inputs[row, _SOUND + action] = 1.0 if sound[row, action] else 0.0
             inputs[row, _GOING + action] = share_of(going.margin_s, most_s)
-        forecast(Task(s, row, p, c, reacted_m, corner_m, sound, in_force), periods, w, later_s)
+        t = Task(s, row, p, c, reacted_m, corner_m, sound, in_force)
+        place = next_place(t, w)
+        tell_place(place, most_m, inputs[row, _PLACE:_LATER])
+        forecast(t, place, periods, w, later_s)
         for action in range(WAYS_TO_WAIT):
             for k in range(periods):
                 at = _LATER + action * periods + k
@@ -177,3 +192,14 @@ def look_into(
 def share_of(margin_s: float, most_s: float) -> float:
     """Map a margin to [-1, 1]."""
     return max(-1.0, min(margin_s / most_s, 1.0))
+
+
+@kernel
+def tell_place(place: Place, most_m: float, inputs: Inputs) -> None:
+    """Fill what the network is told of the next place (4,); 1, 1, 0, 0 where there is none."""
+    inputs[0] = math.sqrt(min(max(place.free_m / most_m, 0.0), 1.0))
+    inputs[1] = math.sqrt(min(place.rest_m / most_m, 1.0))
+    inputs[2], inputs[3] = 0.0, 0.0
+    if place.rest_m < math.inf:
+        inputs[2] = min((place.clear_m - place.rest_m) / (0.5 * most_m), 1.0)
+        inputs[3] = 1.0 if place.joins else 0.0

@@ -9,6 +9,7 @@ import pytest
 
 from risk_dqn_planner.errors import ConfigurationError
 from risk_dqn_planner.policies.base import Action
+from risk_dqn_planner.policies.foresight.forecast import nearing_speed, reached, travelled
 from risk_dqn_planner.policies.outlook import Outlook, OutlookConfig
 from risk_dqn_planner.safety.assumptions import SafetyAssumptions
 from risk_dqn_planner.safety.guard import Guard
@@ -40,7 +41,7 @@ def test_the_margin_of_going_is_the_time_that_is_missing(situation: Make) -> Non
 
 
 def test_the_forecast_sees_the_gap_behind_a_vehicle_that_passes(situation: Make) -> None:
-    later = Outlook().look(situation([AT_THE_ZONE], [COMING]), NEW).inputs[0, 9:].reshape(2, 8)
+    later = Outlook().look(situation([AT_THE_ZONE], [COMING]), NEW).inputs[0, 13:].reshape(3, 8)
     # Half a second on it is 3.5 m nearer; after 3 s it is in the zone, after 3.5 s it has left.
     assert later[0, 0] == pytest.approx((13.5 / 7.0 - THROUGH_S - 0.1) / 4.0, abs=1e-4)
     assert later[0, 5] == pytest.approx((-THROUGH_S - 0.1) / 4.0, abs=1e-4)
@@ -49,9 +50,29 @@ def test_the_forecast_sees_the_gap_behind_a_vehicle_that_passes(situation: Make)
 
 def test_who_creeps_forward_needs_a_shorter_gap_or_is_in_the_way(situation: Make) -> None:
     far = {"id": 3, "ego_m": 13.0}
-    later = Outlook().look(situation([far], [{**COMING, "m": 45.0}]), NEW).inputs[0, 9:]
-    waiting, creeping = later.reshape(2, 8)
-    assert creeping[0] > waiting[0]
+    later = Outlook().look(situation([far], [{**COMING, "m": 45.0}]), NEW).inputs[0, 13:]
+    waiting, creeping, nearing = later.reshape(3, 8)
+    assert nearing[3] > creeping[3] > waiting[3]
+
+
+def test_it_tells_how_far_the_next_place_to_wait_is(situation: Make) -> None:
+    # The zone of 6 m begins 10 m ahead, the margin before it is 0.1 m.
+    views = Outlook().look(situation([{"id": 3, "ego_m": 13.0}]), NEW)
+    ways = [np.sqrt(9.9 / 40.0), np.sqrt(9.9 / 40.0), 6.1 / 20.0, 0.0]
+    assert views.inputs[0, 9:13].tolist() == pytest.approx(ways, abs=1e-6)
+    nothing_ahead = Outlook().look(situation(), NEW)
+    assert nothing_ahead.inputs[0, 9:13].tolist() == [1.0, 1.0, 0.0, 0.0]
+
+
+def test_who_comes_nearer_rests_before_the_zone() -> None:
+    p = SafetyAssumptions().numbers()
+    way_m, mps = 0.0, 3.0
+    for _ in range(20):
+        target_mps = nearing_speed(way_m, mps, 7.0, p)
+        way_m += travelled(mps, target_mps, p.period_s, p)
+        mps = reached(mps, target_mps, p.period_s, p)
+    assert mps == 0.0
+    assert 6.0 < way_m <= 7.0
 
 
 def test_sound_is_what_the_guard_calls_sound(random_situations: Make) -> None:
@@ -68,7 +89,7 @@ def test_sound_is_what_the_guard_calls_sound(random_situations: Make) -> None:
 
 def test_all_numbers_are_between_minus_one_and_one(random_situations: Make) -> None:
     inputs = Outlook().look(random_situations(4, 500), np.ones(500, dtype=np.bool_)).inputs
-    assert inputs.shape == (500, OutlookConfig().size) == (500, 25)
+    assert inputs.shape == (500, OutlookConfig().size) == (500, 37)
     assert np.isfinite(inputs).all()
     assert np.abs(inputs).max() <= 1.0
 
@@ -98,7 +119,8 @@ def test_its_assumptions_decide_the_margins(situation: Make) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "value"), [("periods", 0), ("most_s", 0.0), ("nearest_corner_m", -1.0)]
+    ("name", "value"),
+    [("periods", 0), ("most_s", 0.0), ("most_m", -1.0), ("nearest_corner_m", -1.0)],
 )
 def test_a_number_that_makes_no_sense_is_refused_by_its_name(name: str, value: float) -> None:
     with pytest.raises(ConfigurationError, match=f"OutlookConfig.{name} is"):

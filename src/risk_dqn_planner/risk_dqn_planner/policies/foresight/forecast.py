@@ -1,37 +1,108 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How much time there would be if the ego waited, or crept, for a while and then went (kernels).
+"""How much time there would be if the ego waited for a while and then went (kernels).
 
-In traffic that keeps its speed, for each of the coming decisions. Nothing is searched and nothing
-is chosen: the plans are always the same ones, and their margins are numbers for a network.
+In traffic that keeps its speed, for each of the coming decisions, and for three ways to wait: by
+Stop, by Slow, and by going as far as it can still rest before the next zone. Nothing is searched
+and nothing is chosen: the plans are always the same ones, and their margins are numbers for a
+network.
 """
+
+import math
+from typing import NamedTuple
 
 from risk_dqn_planner.compiled import kernel
 from risk_dqn_planner.policies.foresight.prediction import look_from, predict
 from risk_dqn_planner.policies.foresight.task import Task, Work
+from risk_dqn_planner.policies.foresight.waiting import find_places, free_way
 from risk_dqn_planner.risk.motion import distance_after, speed_after
+from risk_dqn_planner.safety.assumptions import SafetyNumbers
 from risk_dqn_planner.safety.course import begin_course
-from risk_dqn_planner.safety.joint_check import judge, target_of
+from risk_dqn_planner.safety.joint_check import ACTIONS, judge, target_of
 from risk_dqn_planner.situation.situations import Floats
 
-# What the ego may do before it goes: Stop and Slow.
-WAYS_TO_WAIT = 2
+_ROUNDING = 1e-6
+# By Stop, by Slow, by coming nearer.
+WAYS_TO_WAIT = 3
+_COME_NEARER = 2
+
+
+class Place(NamedTuple):
+    """Where the ego will wait next, if it has to: ways [m] from now on, infinity if nowhere.
+
+    free_m: the way up to the next zone. rest_m: to the place. clear_m: to the end of the zones
+    behind it, up to another place. joins: it waits to join a lane.
+    """
+
+    free_m: float
+    rest_m: float
+    clear_m: float
+    joins: bool
 
 
 @kernel
-def forecast(t: Task, periods: int, w: Work, margin_s: Floats) -> None:
-    """Fill the margins (2, K) of going after k + 1 periods of Stop, and of Slow.
+def next_place(t: Task, w: Work) -> Place:
+    """Return the nearest place before which the ego can still come to rest."""
+    mps = max(t.s.ego_speed_mps[t.row], 0.0)
+    stops_m = 0.5 * mps * mps / t.p.ego_down_mps2
+    free_m, count = free_way(t), find_places(t, w.places)
+    rest_m, clear_m, joins = math.inf, math.inf, False
+    for j in range(count):
+        if stops_m - _ROUNDING <= w.places.rest_m[j] < rest_m:
+            rest_m, clear_m = w.places.rest_m[j], w.places.clear_m[j]
+            joins = w.places.joins[j]
+    return Place(free_m, rest_m, clear_m, joins)
+
+
+@kernel
+def forecast(t: Task, place: Place, periods: int, w: Work, margin_s: Floats) -> None:
+    """Fill the margins (3, K) of going after k + 1 periods of each way to wait.
 
     A margin is the one of the joint check [s], in the situation predicted for then.
     """
     p, now_mps = t.p, max(t.s.ego_speed_mps[t.row], 0.0)
+    near_m, near_mps = 0.0, now_mps
+    limit_m = place.free_m if place.rest_m == math.inf else place.rest_m
     for k in range(1, periods + 1):
         predict(t, k, w)
         time_s = k * p.period_s
-        for action in range(WAYS_TO_WAIT):
-            target_mps = target_of(action, p)
-            way_m = distance_after(time_s, now_mps, target_mps, p.ego_up_mps2, p.ego_down_mps2)
-            mps = speed_after(time_s, now_mps, target_mps, p.ego_up_mps2, p.ego_down_mps2)
+        for wait in range(WAYS_TO_WAIT):
+            if wait == _COME_NEARER:
+                target_mps = nearing_speed(near_m, near_mps, limit_m, p)
+                way_m = near_m + travelled(near_mps, target_mps, p.period_s, p)
+                mps = reached(near_mps, target_mps, p.period_s, p)
+                near_m, near_mps = way_m, mps
+            else:
+                target_mps = target_of(wait, p)
+                way_m = travelled(now_mps, target_mps, time_s, p)
+                mps = reached(now_mps, target_mps, time_s, p)
             look_from(t, k, way_m, w)
             course = begin_course(mps, target_mps, p.fast_mps, p)
             verdict = judge(w.ahead, k, course, w.arrival_s, w.who, w.reacted_m, p)
-            margin_s[action, k - 1] = verdict.margin_s
+            margin_s[wait, k - 1] = verdict.margin_s
+
+
+@kernel
+def nearing_speed(way_m: float, mps: float, limit_m: float, p: SafetyNumbers) -> float:
+    """Return the speed of the fastest action after which the ego can rest before a limit."""
+    for slower in range(ACTIONS - 1):
+        target_mps = target_of(ACTIONS - 1 - slower, p)
+        then_mps = reached(mps, target_mps, p.period_s, p)
+        stops_m = way_m + travelled(mps, target_mps, p.period_s, p)
+        stops_m += 0.5 * then_mps * then_mps / p.ego_down_mps2
+        if stops_m <= limit_m:
+            return target_mps
+    return 0.0
+
+
+@kernel
+def travelled(mps: float, target_mps: float, time_s: float, p: SafetyNumbers) -> float:
+    """Return the way of an ego that heads for a speed."""
+    way_m: float = distance_after(time_s, mps, target_mps, p.ego_up_mps2, p.ego_down_mps2)
+    return way_m
+
+
+@kernel
+def reached(mps: float, target_mps: float, time_s: float, p: SafetyNumbers) -> float:
+    """Return the speed of an ego that heads for one."""
+    then_mps: float = speed_after(time_s, mps, target_mps, p.ego_up_mps2, p.ego_down_mps2)
+    return then_mps

@@ -29,6 +29,7 @@ class Critical(enum.IntEnum):
     APPROACHING = 1  # on the way to the conflict zone
     IN_ZONE = 2  # in the conflict zone
     AHEAD = 3  # in the ego's own lane, ahead of it
+    BEHIND = 4  # in the ego's own lane, behind it
 
 
 @dataclass(frozen=True)
@@ -45,7 +46,8 @@ class Explanation:
     speed, the lane's limit where it is hidden.
     reach_s: until it reaches the zone, 0 inside. leave_s: until the ego has left the zone.
     gap_wanted_s: least time wanted between both. lacking_s: what the gap lacks, negative to spare;
-    on merging lanes room counts as time. ahead_m: how far it is ahead, between centres.
+    on merging lanes room counts as time. ahead_m: how far it is ahead, between centres,
+    negative behind.
     margins_s: by Action, what the check of soundness leaves, negative what lacks.
     ego_distance_m: from the ego to the centre of that zone. stop_line_distance_m: from its front.
     """

@@ -8,6 +8,7 @@ from typing import NamedTuple
 from risk_dqn_planner.explanation.fields import Critical, Explanation, Verdict
 from risk_dqn_planner.policies.base import Action, Reason, Supervision
 
+_SAME_LANE = (Critical.AHEAD, Critical.BEHIND)
 _CHECKS = {
     Supervision.OVERRULED: "supervisor overrules {}",
     Supervision.OBJECTED: "supervisor objects",
@@ -81,8 +82,11 @@ def _who_comes(facts: Facts) -> str:
             f"a vehicle there {comes} in {why.reach_s:.1f} s"
         )
     who = f"vehicle {facts.vehicle_id}"
-    if why.critical is Critical.AHEAD:
-        return f"{who} from {lane} drives {why.ahead_m:.1f} m ahead at {why.speed_mps:.1f} m/s"
+    if why.critical in _SAME_LANE:
+        side = "ahead" if why.critical is Critical.AHEAD else "behind"
+        return (
+            f"{who} from {lane} drives {abs(why.ahead_m):.1f} m {side} at {why.speed_mps:.1f} m/s"
+        )
     if why.critical is Critical.IN_ZONE:
         return f"{who} is in {zone}"
     return f"{who} reaches {zone} in {why.reach_s:.1f} s"
@@ -92,8 +96,8 @@ def _outlook(facts: Facts) -> str:
     """Say what follows for the ego, from the considered action where that is another one."""
     why = facts.why
     other = _other_action(facts)
-    if why.critical is Critical.AHEAD:
-        return _behind_leader(why, other)
+    if why.critical in _SAME_LANE:
+        return _in_same_lane(why, other)
     after = f" with {other}" if other else ""
     if why.verdict is Verdict.STOPS_IN_TIME:
         return f", can still stop{after}"
@@ -114,7 +118,7 @@ def _other_action(facts: Facts) -> str:
     return "" if considered is None or considered is facts.action or named else considered.name
 
 
-def _behind_leader(why: Explanation, other: str) -> str:
+def _in_same_lane(why: Explanation, other: str) -> str:
     if why.verdict is Verdict.KEEPS_BACK:
         return "; keeps back"
     if why.verdict in {Verdict.TOO_CLOSE, Verdict.NO_WAY_OUT}:

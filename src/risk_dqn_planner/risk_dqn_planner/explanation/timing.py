@@ -12,10 +12,11 @@ import numpy as np
 from risk_dqn_planner.explanation.answer import NOBODY, Pair
 from risk_dqn_planner.policies.base import Action
 from risk_dqn_planner.policies.rule_based import RuleBasedConfig
-from risk_dqn_planner.risk.rewards import reach_time
+from risk_dqn_planner.risk.rewards import leader_gap, reach_time
 from risk_dqn_planner.safety.assumptions import NO_CAP_MPS, SafetyAssumptions, SafetyNumbers
-from risk_dqn_planner.safety.course import GO, begin_course, time_at, with_manoeuvre
+from risk_dqn_planner.safety.course import BRAKE, GO, begin_course, time_at, with_manoeuvre
 from risk_dqn_planner.safety.joint_check import NO_MANOEUVRE, target_of
+from risk_dqn_planner.safety.merging import leader_margin
 from risk_dqn_planner.safety.others import hidden_arrival, hidden_speed, vehicle_arrival
 from risk_dqn_planner.situation.situations import Situations
 
@@ -97,6 +98,56 @@ def distance_and_speed(s: Situations, whom: Pair, by: Yardstick) -> tuple[float,
         distance_m = float(s.lane_hidden_distance_m[0, lane])
         return distance_m, float(hidden_speed(s, 0, lane, by.numbers))
     return float(s.vehicle_distance_m[0, vehicle]), float(s.vehicle_speed_mps[0, vehicle])
+
+
+class Leader(NamedTuple):
+    """Who is ahead on the ego's path, and what room lacks to stop behind, as time at fast speed."""
+
+    whom: Pair
+    lacking_s: float
+
+
+def has_joined(s: Situations, whom: Pair) -> bool:
+    """Tell whether a vehicle of a merging lane is on the ego's path already."""
+    vehicle, lane = whom
+    joined_m = -0.5 * s.lane_zone_m[0, lane]
+    return bool(
+        vehicle >= 0 and s.lane_merging[0, lane] and s.vehicle_distance_m[0, vehicle] <= joined_m
+    )
+
+
+def ahead_of_ego(s: Situations, whom: Pair) -> float:
+    """Return how far a vehicle of a merging lane is ahead of the ego, between centres [m]."""
+    vehicle, lane = whom
+    return float(
+        leader_gap(
+            s.lane_ego_distance_m[0, lane],
+            s.lane_ego_zone_m[0, lane],
+            s.vehicle_distance_m[0, vehicle],
+            s.lane_zone_m[0, lane],
+        )
+    )
+
+
+def tightest_leader(s: Situations, action: Action, by: Yardstick) -> Leader | None:
+    """Return whom the ego has the least room to stop behind after an action; None without any."""
+    p = by.numbers
+    ego_mps = max(float(s.ego_speed_mps[0]), 0.0)
+    going = begin_course(ego_mps, target_of(int(by.in_force), p), target_of(int(action), p), p)
+    braking = with_manoeuvre(going, BRAKE, p)
+    found = []
+    for k in np.flatnonzero(s.vehicle_mask[0]):
+        whom = Pair(int(k), int(s.vehicle_lane[0, k]))
+        ahead_m = ahead_of_ego(s, whom) - p.position_error_m
+        if not has_joined(s, whom) or ahead_m <= 0.0:
+            continue
+        slow_mps = max(float(s.vehicle_speed_mps[0, k]) - p.speed_error_mps, 0.0)
+        room_m = float(leader_margin(braking, ahead_m, slow_mps, p))
+        found.append((room_m, int(s.vehicle_id[0, k]), int(s.lane_id[0, whom.lane]), whom))
+    if not found:
+        return None
+    room_m, *_, whom = min(found)
+    return Leader(whom, -room_m / p.fast_mps)
 
 
 def nearest(s: Situations, action: Action, by: Yardstick) -> Pair:

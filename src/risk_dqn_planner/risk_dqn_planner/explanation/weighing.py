@@ -9,15 +9,17 @@ from risk_dqn_planner.explanation.answer import NOBODY, Answer, Pair
 from risk_dqn_planner.explanation.fields import Critical, Explanation, Verdict
 from risk_dqn_planner.explanation.timing import (
     Yardstick,
+    ahead_of_ego,
     arrival_time,
     distance_and_speed,
+    has_joined,
     leave_time,
     nearest,
     of_check,
     of_prediction,
+    tightest_leader,
 )
 from risk_dqn_planner.policies.rule_based import RuleBasedConfig
-from risk_dqn_planner.risk.rewards import leader_gap
 from risk_dqn_planner.safety.assumptions import SafetyAssumptions
 from risk_dqn_planner.safety.course import GO
 from risk_dqn_planner.situation.situations import Situations
@@ -52,6 +54,8 @@ def weigh(
     if whom.lane < 0:
         return Weighed(known, whom)
     told = _about(whom, known, answer, s, by)
+    if told.critical is Critical.AHEAD and answer.is_told_by_check and answer.lacking_s > 0.0:
+        told, whom = _behind_leader(known, answer, s, by) or (told, whom)
     return Weighed(replace(told, verdict=_verdict(told, answer, by)), whom)
 
 
@@ -93,14 +97,10 @@ def _about(
         ego_distance_m=float(s.lane_ego_distance_m[0, lane]),
         lacking_s=_room_lacking(whom, answer) if merging else math.nan,
     )
-    if merging and whom.vehicle >= 0 and distance_m <= -0.5 * s.lane_zone_m[0, lane]:
-        ahead_m = leader_gap(
-            s.lane_ego_distance_m[0, lane],
-            s.lane_ego_zone_m[0, lane],
-            distance_m,
-            s.lane_zone_m[0, lane],
-        )
-        return replace(known, critical=Critical.AHEAD, ahead_m=float(ahead_m))
+    if has_joined(s, whom):
+        ahead_m = ahead_of_ego(s, whom)
+        critical = Critical.AHEAD if ahead_m > 0.0 else Critical.BEHIND
+        return replace(known, critical=critical, ahead_m=ahead_m)
     periods = GO
     if answer.is_told_by_check and answer.checked is not None:
         periods = answer.checked[answer.considered].periods
@@ -112,6 +112,21 @@ def _about(
         return known
     gap_s = by.gap_wanted_s
     return replace(known, gap_wanted_s=gap_s, lacking_s=gap_s - (reach_s - leave_s))
+
+
+def _behind_leader(
+    known: Explanation, answer: Answer, s: Situations, by: Yardstick
+) -> Weighed | None:
+    """Tell of the leader that leaves the least room to stop; None without any.
+
+    Going on for ever fails behind any leader, however far, so the check may name any of them.
+    """
+    leader = tightest_leader(s, answer.considered, by)
+    if leader is None:
+        return None
+    told = _about(leader.whom, known, answer, s, by)
+    lacking_s = leader.lacking_s if leader.lacking_s > 0.0 else math.nan
+    return Weighed(replace(told, lacking_s=lacking_s), leader.whom)
 
 
 def _room_lacking(whom: Pair, answer: Answer) -> float:

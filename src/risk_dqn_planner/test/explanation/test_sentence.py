@@ -20,7 +20,7 @@ READ = {
     "reach_s": r"(?:zone of lane -?\d+|arrives|merges) in ([\d.]+) s",
     "leave_s": r"leaving takes ([\d.]+) s",
     "distance_m": r"hidden beyond (-?[\d.]+) m",
-    "ahead_m": r"drives (-?[\d.]+) m ahead",
+    "ahead_m": r"drives ([\d.]+) m (?:ahead|behind)",
     "speed_mps": r"at (-?[\d.]+) m/s",
     "gap_wanted_s": r"gap wanted ([\d.]+) s",
     "lacking_s": r"(-?[\d.]+) s of room",
@@ -120,6 +120,7 @@ def test_words_by_example(changed: dict[str, Any], words: str) -> None:
     assert sentence(facts(**changed)) == words
 
 
+SAME_LANE = (Critical.AHEAD, Critical.BEHIND)
 TIMES = st.floats(0.0, 99.0)
 REASONS = [reason for reason in Reason if not reason.is_fault]
 
@@ -128,7 +129,7 @@ REASONS = [reason for reason in Reason if not reason.is_fault]
 def all_facts(draw: st.DrawFn) -> Facts:
     """Facts as they may come from any policy, and some that none would give."""
     hidden = draw(st.booleans())
-    places = [each for each in Critical if not (hidden and each is Critical.AHEAD)]
+    places = [each for each in Critical if not (hidden and each in SAME_LANE)]
     critical = draw(st.sampled_from(places))
     supervision = draw(st.sampled_from(Supervision))
     joint = draw(st.booleans())
@@ -144,7 +145,7 @@ def all_facts(draw: st.DrawFn) -> Facts:
         leave_s=draw(TIMES),
         gap_wanted_s=math.nan if joint else draw(st.floats(0.0, 9.0)),
         lacking_s=draw(st.floats(-99.0, 99.0) | st.just(math.inf) | st.just(math.nan)),
-        ahead_m=draw(st.floats(0.0, 200.0)),
+        ahead_m=draw(st.floats(0.0, 200.0)) * (-1 if critical is Critical.BEHIND else 1),
         margins_s=draw(st.tuples(*[st.floats(-9.0, 9.0) | st.just(math.nan)] * 3)),
     )
     return Facts(
@@ -167,6 +168,7 @@ def test_every_number_in_the_words_is_that_of_its_field(given_: Facts) -> None:
     for name, value in said.items():
         field = getattr(given_.why, name, None)
         field = getattr(given_, name) if field is None else field
+        field = abs(field) if name == "ahead_m" else field
         assert value == pytest.approx(field, abs=0.0500001), name
     if lead is not None:
         rest = [q for action, q in enumerate(given_.q_values) if action != given_.action]
@@ -184,12 +186,13 @@ def test_whoever_is_critical_is_named_with_what_makes_them_so(given_: Facts) -> 
     assert "lane_id" in said
     assert ("vehicle_id" in said) is not why.hidden
     assert ("reach_s" in said) == (why.critical is Critical.APPROACHING)
-    assert ("ahead_m" in said) == (why.critical is Critical.AHEAD)
+    assert ("ahead_m" in said) == (why.critical in SAME_LANE)
+    assert (" m behind" in text) == (why.critical is Critical.BEHIND)
     assert ("distance_m" in said) == (why.hidden and why.critical is Critical.APPROACHING)
     assert ("leave_s" in said) == (
-        why.critical is not Critical.AHEAD and why.verdict is not Verdict.STOPS_IN_TIME
+        why.critical not in SAME_LANE and why.verdict is not Verdict.STOPS_IN_TIME
     )
-    if why.critical is not Critical.AHEAD:
+    if why.critical not in SAME_LANE:
         assert ("merg" in text) == why.merging
 
 

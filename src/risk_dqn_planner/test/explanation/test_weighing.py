@@ -95,7 +95,7 @@ def test_what_lacks_is_the_gap_wanted_less_the_gap_there_is(told: Told, name: st
             gap_s = why.reach_s - why.leave_s
             assert why.lacking_s == pytest.approx(why.gap_wanted_s - gap_s)
         if why.verdict in {Verdict.TOO_LATE, Verdict.NO_WAY_OUT}:
-            assert why.lacking_s > 0.0 or why.critical is Critical.AHEAD
+            assert why.lacking_s > 0.0 or why.critical in {Critical.AHEAD, Critical.BEHIND}
         if why.verdict is Verdict.TOO_LATE:
             assert decision.action_risks[why.considered] > 0.0
 
@@ -106,7 +106,7 @@ def test_what_lacks_is_what_the_check_of_soundness_says(told: Told, name: str) -
     for decision, _ in told[name]:
         why = decision.explanation
         assert not np.isnan(why.margins_s).any()
-        if why.verdict is Verdict.NO_WAY_OUT:
+        if why.verdict is Verdict.NO_WAY_OUT and why.critical is not Critical.AHEAD:
             assert why.considered is not None
             assert why.lacking_s == pytest.approx(-why.margins_s[why.considered])
             forbidden += 1
@@ -141,6 +141,38 @@ def test_no_vehicle_comes_closer_in_time_than_the_one_that_is_named(told: Told) 
                 assert why.reach_s == 0.0
         clear += 1
     assert clear > 10
+
+
+def test_of_leaders_the_one_is_named_that_leaves_the_least_room_to_stop(situation: Make) -> None:
+    # On the common path behind both joins: one 9 m ahead, one 40 m. After 0.5 s at 5 m/s the ego
+    # rests 2.5 + 25 / 7 = 6.07 m on; it needs 5 m between the centres. 9 + 1 / 16 - 5 - 6.07 m.
+    passed = {"ego_m": -9.0, "ego_zone_m": 20.0, "zone_m": 20.0, "merging": True}
+    s = situation(
+        [passed | {"id": 12, "ego_m": -11.0}],
+        [
+            {"id": 4, "lane": 12, "m": -20.0, "mps": 1.0},
+            {"id": 2, "lane": 12, "m": -51.0, "mps": 5.0},
+        ],
+        ego_mps=5.0,
+    )
+    policy = FastestSoundPolicy()
+    decision = explain(policy.decide(s, np.array([True])), s, 0, policy)
+    assert decision.critical_vehicle_id == 4
+    why = decision.explanation
+    assert (why.critical, why.considered) == (Critical.AHEAD, Action.FAST)
+    assert why.ahead_m == pytest.approx(9.0)
+    assert why.lacking_s == pytest.approx((6.0714 + 5.0 - 9.0625) / 5.0, abs=1e-3)
+
+
+@pytest.mark.parametrize("name", POLICIES)
+def test_who_drives_ahead_is_ahead_and_who_drives_behind_behind(told: Told, name: str) -> None:
+    for decision, _ in told[name]:
+        why = decision.explanation
+        assert (why.ahead_m > 0.0) == (why.critical is Critical.AHEAD)
+        assert (why.ahead_m <= 0.0) == (why.critical is Critical.BEHIND)
+        assert math.isfinite(why.reach_s) == (
+            why.critical in {Critical.APPROACHING, Critical.IN_ZONE}
+        )
 
 
 def test_an_objection_considers_what_was_proposed(told: Told) -> None:

@@ -3,8 +3,8 @@
 
 `python -m sim_bridge.learning.ablation` trains every variant with every seed, drives each policy
 under the enforcing supervisor through test episodes, and writes table.md and results.json into the
-output folder. Run again, it goes on where it was. Exit code: 0 done, 2 an option is no good, 130
-interrupted.
+output folder, and with --report a page. Run again, it goes on where it was. Exit code: 0 done, 2
+an option is no good, 130 interrupted.
 """
 
 import argparse
@@ -18,6 +18,7 @@ import numpy as np
 
 from risk_dqn_planner.errors import ConfigurationError, PlannerError
 from risk_dqn_planner.policies.loading import load_policy
+from risk_dqn_planner.policies.look_ahead import LookAheadConfig
 from risk_dqn_planner.policies.supervised import Supervisor
 from risk_dqn_planner.policies.supervised_loading import is_sound
 from sim_bridge.environment.episodes import DrivenEpisodes, drive
@@ -25,6 +26,7 @@ from sim_bridge.environment.interface import Outcome
 from sim_bridge.environment.place import Place, load_place
 from sim_bridge.environment.seeds import TEST_SEEDS, fixed_seeds
 from sim_bridge.learning.checkpoint import POLICY, RunFolder
+from sim_bridge.learning.config import AdviceConfig
 from sim_bridge.learning.export import initial_weights
 from sim_bridge.learning.presets import preset_named
 from sim_bridge.learning.session import Run, Session
@@ -38,30 +40,56 @@ Change = Callable[[Run], Run]
 Figures = dict[str, float]
 
 
-def _config(**changes: int) -> Change:
+def _config(**changes: object) -> Change:
     return lambda run: replace(run, config=replace(run.config, **changes))  # type: ignore[arg-type]
 
 
-def _repeat(share: float) -> Change:
+def _advice(**changes: object) -> Change:
     def change(run: Run) -> Run:
-        exploration = replace(run.config.exploration, repeat=share)
-        return replace(run, config=replace(run.config, exploration=exploration))
+        advice = replace(run.config.advice or AdviceConfig(), **changes)  # type: ignore[arg-type]
+        return replace(run, config=replace(run.config, advice=advice))
 
     return change
 
 
-# Each differs from the first in one thing.
+def _rewards_alone(run: Run) -> Run:
+    """Nobody shows the way, so it has to be explored: as much as the preset `supervised` does."""
+    exploration = preset_named("supervised").exploration
+    return replace(run, config=replace(run.config, advice=None, exploration=exploration))
+
+
+def _state_alone(run: Run) -> Run:
+    """The paper's state and no expert, as the preset `supervised` has it."""
+    rewards = _rewards_alone(run)
+    return replace(rewards, config=replace(rewards.config, outlook=False))
+
+
+# Each differs from the first in one thing, but for those that leave out ever more of it.
 VARIANTS: Mapping[str, Change] = {
     "reference": lambda run: run,
-    "no_supervisor": lambda run: replace(run, supervisor="off"),
-    "no_memory": lambda run: replace(run, memory="instantaneous"),
-    "reward_collision": lambda run: replace(run, reward="collision"),
+    "advice_alone": _advice(alone=True, weight_end=1.0),
+    "advice_stays": _advice(weight_end=1.0),
+    "advice_not_calm": _advice(switching_price_s=LookAheadConfig.switching_price_s),
+    "rewards_alone": _rewards_alone,
+    "state_alone": _state_alone,
+    "with_memory": lambda run: replace(run, memory="tracked"),
     "reward_arrival": lambda run: replace(run, reward="arrival"),
     "reward_joint_risk": lambda run: replace(run, reward="joint_risk"),
     "one_step": _config(n_step=1),
-    "ten_steps": _config(n_step=10),
     "one_update": _config(updates_per_step=1),
-    "no_repeat": _repeat(0.0),
+}
+MEANING: Mapping[str, str] = {
+    "reference": "Q-learning with an outlook and an expert's advice",
+    "advice_alone": "no Q-learning: the expert is imitated",
+    "advice_stays": "the advice's weight does not fall to 0 over the run",
+    "advice_not_calm": "the expert pays no more for changes of action than when it drives itself",
+    "rewards_alone": "no advice; more exploration instead",
+    "state_alone": "no advice and no outlook: the paper's state",
+    "with_memory": "trained and driven with the memory of free space (`tracked`)",
+    "reward_arrival": "the reward has no prices for changes and hard brakes",
+    "reward_joint_risk": "the reward counts the risk of all vehicles as well",
+    "one_step": "one-step instead of five-step returns",
+    "one_update": "one update a step of all environments instead of four",
 }
 
 # Means over a policy's episodes in all cells, in the order of the table.
@@ -92,14 +120,43 @@ def figures_of(cells: Sequence[DrivenEpisodes]) -> Figures:
     }
 
 
-def table_of(results: Mapping[str, Sequence[Figures]]) -> str:
-    """Return a table in Markdown: mean over the seeds, and the lowest and highest of them."""
-    lines = ["| variant | seeds | " + " | ".join(COLUMNS.values()) + " |"]
-    lines += ["|" + " --- |" * (2 + len(COLUMNS))]
+def table_of(results: Mapping[str, Sequence[Figures]], columns: Mapping[str, str]) -> str:
+    """Return a table in Markdown: mean over the seeds, and the lowest and highest of them.
+
+    columns: names of figures, and what stands above them.
+    """
+    lines = ["| variant | seeds | " + " | ".join(columns.values()) + " |"]
+    lines += ["|" + " --- |" * (2 + len(columns))]
     for variant, seeds in results.items():
-        cells = [_spread([one[name] for one in seeds], name) for name in COLUMNS]
+        cells = [_spread([one[name] for one in seeds], name) for name in columns]
         lines.append(f"| {variant} | {len(seeds)} | " + " | ".join(cells) + " |")
     return "\n".join(lines) + "\n"
+
+
+def page_of(results: Mapping[str, Sequence[Figures]], reference: Run, episodes: int) -> str:
+    """Return the page about a comparison, in Markdown."""
+    by_scenario = {name: f"{name} %" for name in reference.scenarios}
+    meanings = [f"- `{name}`: {MEANING[name]}." for name in results]
+    config = reference.config
+    about = (
+        f"Preset `{config.preset}`, reward `{reference.reward}`, {config.steps} environment steps "
+        f"on {', '.join(reference.map_names)}\nin {', '.join(reference.scenarios)}; {episodes} test "
+        "episodes in each cell, the same ones for every\npolicy and none of them seen in training. "
+        "Every action taken is sound. Each entry is the mean over the\nseeds of the trainings, with "
+        "the lowest and the highest of them.\n"
+    )
+    return "\n".join(
+        [
+            "# What works under the supervisor\n",
+            "<!-- Written by `python -m sim_bridge.learning.ablation --report`; do not edit. -->\n",
+            about,
+            *meanings,
+            "\n## All cells\n",
+            table_of(results, COLUMNS),
+            "## Success by scenario\n",
+            table_of(results, by_scenario),
+        ]
+    )
 
 
 def _spread(values: Sequence[float], name: str) -> str:
@@ -125,15 +182,17 @@ def _train(run: Run, places: Sequence[Place], folder: Path) -> None:
 def _drive(run: Run, places: Sequence[Place], policy: Path, episodes: int) -> Figures:
     """Drive test episodes in each cell of the run, under the enforcing supervisor."""
     learned = load_policy(str(policy), assumptions=run.assumptions)
-    supervised = learned if is_sound(learned) else Supervisor(learned, assumptions=run.assumptions)
+    driver = learned if is_sound(learned) else Supervisor(learned, assumptions=run.assumptions)
     seeds = fixed_seeds(TEST_SEEDS, episodes)
-    return figures_of(
-        [
-            drive(place.simulation(load_scenario(name), episodes, run.memory), supervised, seeds)
+    cells = {
+        name: [
+            drive(place.simulation(load_scenario(name), episodes, run.memory), driver, seeds)
             for place in places
-            for name in run.scenarios
         ]
-    )
+        for name in run.scenarios
+    }
+    shares = {name: figures_of(parts)["success"] for name, parts in cells.items()}
+    return figures_of([part for parts in cells.values() for part in parts]) | shares
 
 
 def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
@@ -141,11 +200,12 @@ def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
     add = parser.add_argument
     add("--variants", default=",".join(VARIANTS), help="names, by commas [%(default)s]")
     add("--seeds", default="0,1,2", help="of the trainings, by commas [%(default)s]")
-    add("--preset", default="supervised", help="of the reference [%(default)s]")
+    add("--preset", default="advised", help="of the reference [%(default)s]")
     add("--steps", type=int, help="environment steps instead of the preset's")
     add("--map", default="four_way", help="own maps, by commas [%(default)s]")
     add("--scenario", default=SCENARIOS, help="names or .yaml files, by commas [%(default)s]")
     add("--episodes", type=int, default=1000, help="test episodes in each cell [%(default)s]")
+    add("--report", type=Path, help="also write a page here")
     add("--out", type=Path, default=Path("out/ablation"), help="folder [%(default)s]")
     return parser.parse_args(argv)
 
@@ -161,7 +221,6 @@ def _reference(arguments: argparse.Namespace) -> Run:
         map_name=arguments.map,
         scenario=arguments.scenario,
         supervisor="enforce",
-        memory="tracked",
     )
 
 
@@ -196,8 +255,11 @@ def _compare(arguments: argparse.Namespace) -> None:
             results.setdefault(name, []).append(figures)
             print(f"{folder}: {figures}", flush=True)
             (out / "results.json").write_text(json.dumps(results, indent=1) + "\n", "utf-8")
-            (out / "table.md").write_text(table_of(results), encoding="utf-8")
-    print(table_of(results))
+            (out / "table.md").write_text(table_of(results, COLUMNS), encoding="utf-8")
+    if arguments.report is not None:
+        page = page_of(results, reference, arguments.episodes)
+        arguments.report.write_text(page, encoding="utf-8")
+    print(table_of(results, COLUMNS))
 
 
 def main(argv: Sequence[str] | None = None) -> int:

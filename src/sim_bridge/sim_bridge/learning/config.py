@@ -125,7 +125,8 @@ class AdviceConfig:
     falling from 1 to 0 over this share of the run, before the learner's states are worth asking
     about. capacity, batch_size: of the memory of advice. weight, weight_end: of the term, linear
     over the run. temperature: Q-values that differ by it are told apart. switching_price_s: of the
-    search, higher than where it drives itself, so that it teaches calm.
+    search, higher than where it drives itself, so that it teaches calm. alone: nothing is learned
+    from rewards, to see what they are worth.
     """
 
     share: float = 1.0
@@ -133,9 +134,10 @@ class AdviceConfig:
     capacity: int = 500_000
     batch_size: int = 256
     weight: float = 1.0
-    weight_end: float = 1.0
+    weight_end: float = 0.0
     temperature: float = 0.1
     switching_price_s: float = 0.5
+    alone: bool = False
 
     def __post_init__(self) -> None:
         for name in ("share", "until"):

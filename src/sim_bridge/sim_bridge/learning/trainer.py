@@ -154,17 +154,22 @@ class Trainer:
         return self._drawn, self._explored
 
     def _learn(self) -> None:
+        advice = self._config.advice
+        if advice is None or not advice.alone:
+            self._learn_from_rewards()
+        if self._advice is not None and advice is not None and len(self._advice):
+            weight = advice.weight_at(self.progress)
+            if weight > 0.0:
+                drawn = self._advice.sample()
+                self._learner.follow(drawn, weight, advice.temperature, self.progress)
+        self._updates += 1
+
+    def _learn_from_rewards(self) -> None:
         drawn = self._replay.sample(
             self._config.batch_size, self._config.replay.beta(self.progress)
         )
         errors, loss = self._learner.update(drawn, self.progress)
         self._replay.update_priorities(drawn.indices, errors)
-        if self._advice is not None and self._config.advice is not None and len(self._advice):
-            config, progress = self._config.advice, self.progress
-            weight = config.weight_at(progress)
-            if weight > 0.0:
-                self._learner.follow(self._advice.sample(), weight, config.temperature, progress)
-        self._updates += 1
         self._loss_sum += loss
         self._loss_count += 1
 

@@ -93,6 +93,7 @@ class PlannerDriver:
             topic.name: node.create_publisher(topic.message, topic.name, topic.qos)
             for topic in topics.INPUTS
         }
+        self.now_ns = 0
         self.diagnostics: dict[str, DiagnosticStatus] = {}
         node.create_subscription(DiagnosticArray, "/diagnostics", self._on_diagnostics, DIAGNOSTICS)
         self._pacing = LockStep(self.link, WallPace(0.0), ANSWER_S)
@@ -110,8 +111,9 @@ class PlannerDriver:
         self.diagnostics.update({status.name: status for status in message.status})
 
     def send_route(self, route: Sequence[int]) -> None:
-        """Publish the ego's route."""
-        self.publishers[topics.ROUTE.name].publish(conversions.route_to_message(route, 0))
+        """Publish the ego's route, a new errand."""
+        message = conversions.route_to_message(route, self.now_ns)
+        self.publishers[topics.ROUTE.name].publish(message)
 
     def publish(self, scene: Scene, *, odometry: Odometry | None = None) -> None:
         """Publish a scene as of the present time; `odometry` replaces the scene's own."""

@@ -13,8 +13,9 @@ BRIDGE = ROOT / "src/sim_bridge/sim_bridge"
 
 ROS_MODULES = {
     "action_msgs", "ament_index_python", "builtin_interfaces", "diagnostic_msgs",
-    "diagnostic_updater", "geometry_msgs", "intersection_msgs", "launch", "launch_ros", "mcap",
-    "mcap_ros2", "nav_msgs", "rcl_interfaces", "rclpy", "rosbags", "rosgraph_msgs", "rosidl_parser",
+    "diagnostic_updater", "geometry_msgs", "intersection_msgs", "launch", "launch_ros",
+    "lifecycle_msgs", "mcap", "mcap_ros2", "nav_msgs", "rcl_interfaces", "rclpy", "rosbags",
+    "rosgraph_msgs", "rosidl_parser",
     "rosidl_runtime_py", "sensor_msgs", "std_msgs", "std_srvs", "tf2_msgs", "tf2_ros",
     "visualization_msgs",
 }  # fmt: skip

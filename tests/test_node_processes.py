@@ -7,9 +7,10 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
-from intersection_msgs.msg import Decision
+from intersection_msgs.msg import Decision, Situation
 from planner_driver import Scene
 from rclpy.node import Node
 
@@ -90,16 +91,37 @@ def test_nodes_that_are_asked_to_end_end_without_an_error(
         assert "Traceback" not in process.output(), process.output()
 
 
-@pytest.mark.parametrize("executable", ["situation_node", "simulator_node"])
-def test_a_node_whose_map_cannot_be_read_says_so_and_ends(
-    start: Start, settings: RunSettings, tmp_path: Path, executable: str
+def test_a_simulator_whose_map_cannot_be_read_says_so_and_ends(
+    start: Start, settings: RunSettings, tmp_path: Path
 ) -> None:
     broken = tmp_path / "broken.osm"
     broken.write_text("this is no map")
     wrong = replace(settings, map_file=broken)
-    commands = [wrong.simulator_command(0.0), *wrong.planner_commands()]
-    command = next(c for c in commands if c.executable == executable)
-    assert "broken.osm is not an OSM file" in complaint(start(command))
+    assert "broken.osm is not an OSM file" in complaint(start(wrong.simulator_command(0.0)))
+
+
+def heard(node: Node, topic: topics.Topic) -> list[Any]:
+    """What comes on a topic from now on."""
+    messages: list[Any] = []
+    node.create_subscription(topic.message, topic.name, messages.append, topic.qos)
+    return messages
+
+
+def test_a_map_that_cannot_be_read_is_told_in_every_situation(
+    node: Node, start: Start, settings: RunSettings, tmp_path: Path
+) -> None:
+    broken = tmp_path / "broken.osm"
+    broken.write_text("this is no map")
+    situations = heard(node, topics.SITUATION)
+    wrong = replace(settings, map_file=broken, overrides={"use_sim_time": False})
+    process = start(wrong.planner_commands()[0])
+    wait_until(lambda: len(situations) >= 2, "situations", PATIENCE_S, process.check)
+    assert {(s.status, s.faulty_input) for s in situations} == {
+        (Situation.NOT_CONFIGURED, Situation.MAP)
+    }
+    assert "broken.osm is not an OSM file" in situations[-1].status_text
+    assert "not configured: " in process.output()
+    assert "Traceback" not in process.output()
 
 
 def test_a_simulator_whose_route_does_not_fit_the_map_says_so_and_ends(
@@ -122,38 +144,49 @@ def test_a_simulator_with_an_unknown_scenario_names_those_there_are(
     assert "there is no scenario 'rush_hour', expected one of: base" in complaint(process)
 
 
-def test_a_policy_node_with_an_unknown_supervisor_names_those_there_are(
-    start: Start, settings: RunSettings
+@pytest.mark.parametrize(
+    ("changed", "reason", "words"),
+    [
+        ({"supervisor": "strict"}, Decision.NOT_CONFIGURED, "expected one of: off, report"),
+        (
+            {"overrides": {"safety.leader_braking_mps2": 3.0}},
+            Decision.NOT_CONFIGURED,
+            "leader_braking_mps2 is 3.0, expected at least",
+        ),
+        ({"policy": "no_such_policy"}, Decision.POLICY_REFUSED, "no_such_policy"),
+    ],
+    ids=["unknown supervisor", "contradiction", "unknown policy"],
+)
+@pytest.mark.parametrize("use_sim_time", [True, False], ids=["simulated", "real"])
+def test_a_policy_node_that_cannot_be_configured_says_stop_and_why_for_ever(
+    node: Node,
+    start: Start,
+    settings: RunSettings,
+    changed: dict[str, Any],
+    reason: int,
+    words: str,
+    use_sim_time: bool,
 ) -> None:
-    command = replace(settings, supervisor="strict").planner_commands()[1]
-    assert "'strict', expected one of: off, report, enforce" in complaint(start(command))
-
-
-def test_assumptions_that_contradict_each_other_end_the_policy_node(
-    start: Start, settings: RunSettings
-) -> None:
-    weaker = {"safety.leader_braking_mps2": 3.0}
-    command = replace(settings, overrides=weaker).planner_commands()[1]
-    assert "leader_braking_mps2 is 3.0, expected at least" in complaint(start(command))
-
-
-def test_a_policy_that_cannot_be_loaded_stops_the_ego_for_ever(
-    node: Node, start: Start, settings: RunSettings
-) -> None:
-    decisions: list[Decision] = []
-    node.create_subscription(Decision, topics.DECISION.name, decisions.append, topics.DECISION.qos)
-    wrong = replace(settings, policy="no_such_policy", overrides={"use_sim_time": False})
-    process = start(wrong.planner_commands()[1])
-    wait_until(lambda: len(decisions) >= 2, "decisions", PATIENCE_S, process.check)
+    decisions = heard(node, topics.DECISION)
+    wrong = replace(settings, **changed)
+    command = replace(wrong, overrides={**wrong.overrides, "use_sim_time": use_sim_time})
+    process = start(command.planner_commands()[1])
+    wait_until(
+        lambda: [d.reason for d in decisions[-2:]] == [reason] * 2,
+        "decisions",
+        PATIENCE_S,
+        process.check,
+    )
     assert {decision.action for decision in decisions} == {Decision.STOP}
-    assert "no_such_policy" in process.output()
+    assert words in decisions[-1].text
+    assert words in process.output()
+    assert "Traceback" not in process.output()
 
 
 def test_while_the_default_policy_is_loaded_the_ego_is_told_to_stop_and_why(
     node: Node, start: Start
 ) -> None:
-    decisions: list[Decision] = []
-    node.create_subscription(Decision, topics.DECISION.name, decisions.append, topics.DECISION.qos)
+    decisions = heard(node, topics.DECISION)
     remapped = {"~/output/decision": topics.DECISION.name}
     process = start(NodeCommand("risk_dqn_planner", "policy_node", remappings=remapped))
     await_ready(process)
@@ -171,8 +204,7 @@ def test_while_the_default_policy_is_loaded_the_ego_is_told_to_stop_and_why(
 def test_a_policy_node_can_be_ended_while_it_still_loads(
     node: Node, start: Start, request_to_end: signal.Signals
 ) -> None:
-    decisions: list[Decision] = []
-    node.create_subscription(Decision, topics.DECISION.name, decisions.append, topics.DECISION.qos)
+    decisions = heard(node, topics.DECISION)
     remapped = {"~/output/decision": topics.DECISION.name}
     process = start(NodeCommand("risk_dqn_planner", "policy_node", remappings=remapped))
     wait_until(lambda: bool(decisions), "a decision", PATIENCE_S, process.check)
@@ -195,7 +227,8 @@ class WallClockInputs:
         self._timer = node.create_timer(0.1, self._publish)
 
     def _publish(self) -> None:
-        scene, now_ns = Scene(), self._node.get_clock().now().nanoseconds
+        # It stays where it is, so it must not say to drive.
+        scene, now_ns = Scene(ego_mps=0.4), self._node.get_clock().now().nanoseconds
         for topic, message in (
             (topics.ODOMETRY, scene.odometry(self._model, now_ns)),
             (topics.VISIBLE_AREA, scene.visible_area(self._model, now_ns)),

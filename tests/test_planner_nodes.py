@@ -13,7 +13,7 @@ from risk_dqn_planner.intersection.model import ConflictPath
 
 pytestmark = pytest.mark.ros
 
-FREE = Scene()
+FREE = Scene(ego_mps=0.4)  # it stays where it is, so it must not say to drive
 
 
 @pytest.fixture(autouse=True)
@@ -41,7 +41,7 @@ def test_a_near_vehicle_stops_the_ego_and_is_named(planner: PlannerDriver) -> No
     vehicle = Vehicle(
         id=7_000_000_000_000, path=first_path(planner), distance_m=15.0, speed_mps=6.0
     )
-    decision = planner.decide(replace(FREE, stop_line_m=3.0, vehicles=(vehicle,)))
+    decision = planner.decide(replace(FREE, ego_mps=5.0, stop_line_m=3.0, vehicles=(vehicle,)))
     assert decision.action == Decision.STOP
     assert decision.reason == Decision.VEHICLE
     assert decision.critical_vehicle_id == vehicle.id
@@ -50,7 +50,7 @@ def test_a_near_vehicle_stops_the_ego_and_is_named(planner: PlannerDriver) -> No
 
 
 def test_a_lane_that_may_hide_a_vehicle_stops_the_ego(planner: PlannerDriver) -> None:
-    decision = planner.decide(replace(FREE, stop_line_m=3.0, seen_m=15.0))
+    decision = planner.decide(replace(FREE, ego_mps=5.0, stop_line_m=3.0, seen_m=15.0))
     assert decision.action == Decision.STOP
     assert decision.reason == Decision.HIDDEN_VEHICLE
     assert decision.critical_vehicle_id == Decision.NO_ID
@@ -71,12 +71,17 @@ def test_inputs_that_stop_stop_the_ego_within_a_second(planner: PlannerDriver) -
     decision = planner.wait()
     assert decision.action == Decision.STOP
     assert decision.reason == Decision.STALE_INPUT
+    assert decision.faulty_input == Decision.ODOMETRY
     assert "old" in decision.text
 
 
-def test_the_ego_drives_again_once_inputs_are_back(planner: PlannerDriver) -> None:
+def test_the_ego_drives_again_once_inputs_have_been_back_for_a_second(
+    planner: PlannerDriver,
+) -> None:
+    assert planner.decide(FREE).action == Decision.FAST
     for _ in range(3):
         assert planner.wait().action == Decision.STOP
+    assert planner.decide(FREE).reason == Decision.RECOVERING
     assert planner.decide(FREE).action == Decision.FAST
 
 
@@ -88,6 +93,7 @@ def test_a_number_that_is_none_stops_the_ego_and_is_named(planner: PlannerDriver
     assert (decision.reason, decision.faulty_input) == (Decision.NOT_FINITE, Decision.ODOMETRY)
     assert "speed_mps is nan" in decision.text
     assert planner.situation().status == Situation.NOT_FINITE
+    assert planner.decide(FREE).reason == Decision.RECOVERING
     assert planner.decide(FREE).action == Decision.FAST
 
 
@@ -136,5 +142,6 @@ def test_a_fault_is_a_diagnostic_error_and_its_end_is_too(planner: PlannerDriver
     planner.wait()
     planner.wait()
     planner.wait_for(lambda: planner.diagnostics[name].level == DiagnosticStatus.ERROR)
-    planner.decide(FREE)
+    for _ in range(3):
+        planner.decide(FREE)
     planner.wait_for(lambda: planner.diagnostics[name].level == DiagnosticStatus.OK)

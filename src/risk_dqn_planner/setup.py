@@ -43,8 +43,8 @@ setup(
     zip_safe=False,
     entry_points={
         "console_scripts": [
-            "policy_node = risk_dqn_planner.ros.policy_node:main",
-            "situation_node = risk_dqn_planner.ros.situation_node:main",
+            "policy_node = risk_dqn_planner.ros.start:policy_node",
+            "situation_node = risk_dqn_planner.ros.start:situation_node",
         ],
     },
 )

@@ -16,7 +16,7 @@ class Status(enum.IntEnum):
     STALE_INPUT = 21  # older than allowed
     FUTURE_INPUT = 22  # ahead of the clock
     OUT_OF_ORDER_INPUT = 23  # stamps went back
-    FROZEN_INPUT = 24  # keeps coming with the same stamp, or the clock stands
+    FROZEN_INPUT = 24  # stamps, ego or clock stand still although they should not
     WRONG_FRAME = 25
     NOT_FINITE = 26
     IMPLAUSIBLE_SPEED = 27
@@ -28,9 +28,8 @@ class Status(enum.IntEnum):
     BAD_ROUTE = 33  # does not fit the map
     OFF_ROUTE = 34  # the ego is beside its route, before it or beyond it
     WRONG_WAY = 35  # the ego faces the wrong way
-    RECOVERING = 36  # inputs are good again, but not for long enough
-    NOT_CONFIGURED = 37  # no usable map or parameters
-    INTERNAL_ERROR = 38  # a bug
+    NOT_CONFIGURED = 36  # no usable map or parameters
+    INTERNAL_ERROR = 37  # a bug
 
 
 class FaultyInput(enum.IntEnum):

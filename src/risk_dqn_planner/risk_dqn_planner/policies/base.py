@@ -49,12 +49,12 @@ class Reason(enum.IntEnum):
     BAD_ROUTE = Status.BAD_ROUTE.value
     OFF_ROUTE = Status.OFF_ROUTE.value
     WRONG_WAY = Status.WRONG_WAY.value
-    RECOVERING = Status.RECOVERING.value
     NOT_CONFIGURED = Status.NOT_CONFIGURED.value
     INTERNAL_ERROR = Status.INTERNAL_ERROR.value
     POLICY_NOT_READY = 60  # it is still being loaded
     POLICY_REFUSED = 61  # it cannot or must not be used, see the text
     POLICY_FAILED = 62  # it could not be evaluated
+    RECOVERING = 63  # all is good again, but not for long enough
 
     @property
     def is_fault(self) -> bool:

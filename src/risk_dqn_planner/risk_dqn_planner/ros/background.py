@@ -1,36 +1,44 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A node that goes on serving its timers while its own thread is busy."""
+"""A node's callbacks in a thread of their own, so that loading a policy silences nobody."""
 
 import threading
+import traceback
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 
 
 @contextmanager
-def spinning(node: Node) -> Iterator[None]:
+def spinning(node: Node) -> Iterator[Executor]:
     """Run a node's callbacks in a thread of their own; afterwards nobody runs them.
 
-    The caller keeps the main thread, which is the one that a request to end interrupts.
+    The caller keeps the main thread, which is the one that a request to end interrupts. A callback
+    that fails is told of, and the others go on.
     """
     executor = SingleThreadedExecutor(context=node.context)
     executor.add_node(node)
+    ended = threading.Event()
+
+    def spin_once_more() -> None:
+        try:
+            executor.spin()
+        except ExternalShutdownException:
+            return
+        except Exception:  # noqa: BLE001 (a vehicle needs its decisions, whatever fails)
+            if not ended.is_set() and node.context.ok():
+                node.get_logger().error(traceback.format_exc(), throttle_duration_sec=10.0)
 
     def spin() -> None:
-        try:
-            with suppress(ExternalShutdownException):
-                executor.spin()
-        except Exception:
-            # rclpy calls fail in many ways once a signal has shut its context down.
-            if node.context.ok():
-                raise
+        while not ended.is_set() and node.context.ok():
+            spin_once_more()
 
     thread = threading.Thread(target=spin, name=f"{node.get_name()} callbacks", daemon=True)
     thread.start()
     try:
-        yield
+        yield executor
     finally:
-        executor.shutdown()
-        thread.join()
+        ended.set()
+        executor.shutdown(timeout_sec=5.0)
+        thread.join(timeout=5.0)

@@ -196,6 +196,7 @@ def situation_to_message(report: SituationReport, frame_id: str = "map") -> Situ
         faulty_input=int(report.source),
         status_text=report.text,
         route=list(report.route),
+        route_stamp=to_stamp(report.route_stamp_ns),
     )
     if report.situations is not None:
         _fill_situation(message, report.situations)
@@ -249,6 +250,7 @@ def situation_from_message(message: SituationMessage) -> SituationReport:
         source=source,
         text=message.status_text,
         route=tuple(int(lanelet_id) for lanelet_id in message.route),
+        route_stamp_ns=to_ns(message.route_stamp),
         stop_line_derived=message.stop_line_derived,
         situations=_read_situation(message) if status is Status.OK else None,
     )

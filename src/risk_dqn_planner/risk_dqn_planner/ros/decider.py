@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""When a policy may be asked, and what is decided when it may not: plain Python, without ROS 2."""
+"""When a policy may be asked, and what is decided when it may not: plain Python, without ROS 2.
+
+Whatever is doubtful is answered with Stop and its reason, at once; after it, all must be good for
+a while before the policy is asked again, so that decisions do not flicker.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -8,20 +12,28 @@ from typing import NamedTuple
 import numpy as np
 
 from risk_dqn_planner.decision import Decision, Reason, fault_decision
+from risk_dqn_planner.errors import InputError
 from risk_dqn_planner.faults import FaultyInput
 from risk_dqn_planner.policies.base import Decisions, Policy
-from risk_dqn_planner.situation.report import SituationReport, Status
+from risk_dqn_planner.ros.streams import SECOND_NS, AgeLimits, Stream
+from risk_dqn_planner.situation.report import Fault, SituationReport, Status
 from risk_dqn_planner.situation.situations import Situations
 from risk_dqn_planner.vehicle import require_positive
 
-SECOND_NS = 1_000_000_000
-
 Explain = Callable[[Decisions, Situations, int, Policy], Decision]
+
+# What says nothing against inputs that come later: a new errand begins without it.
+_SETTLED_BY_ERRAND = frozenset(
+    (
+        Reason.MISSING_INPUT, Reason.STALE_INPUT, Reason.FROZEN_INPUT, Reason.BAD_ROUTE,
+        Reason.OFF_ROUTE, Reason.WRONG_WAY, Reason.NOT_CONFIGURED,
+    )
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
 class DeciderConfig:
-    """How old a situation may be, and after what gap earlier ones are forgotten."""
+    """How old a situation may be, and when decisions and histories go on after a fault."""
 
     max_situation_age_s: float = field(
         default=0.5,
@@ -29,6 +41,25 @@ class DeciderConfig:
             "description": "An older situation is answered with Stop [s]",
             "minimum": 0.01,
             "maximum": 10.0,
+            "live": True,
+        },
+    )
+    max_situation_ahead_s: float = field(
+        default=0.2,
+        metadata={
+            "description": "A situation further ahead of the clock is answered with Stop [s]",
+            "minimum": 0.0,
+            "maximum": 10.0,
+            "live": True,
+        },
+    )
+    max_repeat_s: float = field(
+        default=0.25,
+        metadata={
+            "description": "A situation that was decided on longer ago is frozen: Stop [s]",
+            "minimum": 0.0,
+            "maximum": 10.0,
+            "live": True,
         },
     )
     max_history_gap_s: float = field(
@@ -37,11 +68,27 @@ class DeciderConfig:
             "description": "After a longer gap between situations the history starts anew [s]",
             "minimum": 0.01,
             "maximum": 10.0,
+            "live": True,
+        },
+    )
+    recovery_s: float = field(
+        default=1.0,
+        metadata={
+            "description": "After a fault all must be good for this long before the policy is "
+            "asked again [s]",
+            "minimum": 0.0,
+            "maximum": 60.0,
+            "live": True,
         },
     )
 
     def __post_init__(self) -> None:
-        require_positive(self)
+        require_positive(self, skip=("max_situation_ahead_s", "max_repeat_s", "recovery_s"))
+
+    @property
+    def ages(self) -> AgeLimits:
+        """The limits of situations as those of any input."""
+        return AgeLimits(self.max_situation_age_s, self.max_situation_ahead_s)
 
 
 class UnusablePolicy(NamedTuple):
@@ -51,6 +98,7 @@ class UnusablePolicy(NamedTuple):
     fault: str
     hash: str = ""
     reason: Reason = Reason.POLICY_REFUSED
+    source: FaultyInput = FaultyInput.POLICY
 
 
 class Choice(NamedTuple):
@@ -58,6 +106,14 @@ class Choice(NamedTuple):
 
     decision: Decision
     situation_stamp_ns: int | None
+
+
+class Trouble(NamedTuple):
+    """Why the policy may not be asked."""
+
+    reason: Reason
+    source: FaultyInput
+    text: str
 
 
 class Decider:
@@ -76,43 +132,127 @@ class Decider:
         restart_after_fault: the policy counts on what it decided having been carried out, as
         supervisors do, so that a Stop in between which was not its own makes its memory void.
         """
-        self._policy = policy
-        self._restart_after_fault = restart_after_fault
+        self.policy = policy
+        self.restart_after_fault = restart_after_fault
         self._interrupted = False  # by such a Stop, since the policy was asked last
         self._explain = explain
-        self._max_age_ns = int(config.max_situation_age_s * SECOND_NS)
-        self._max_gap_ns = int(config.max_history_gap_s * SECOND_NS)
+        self.config = config
+        self.stream = Stream(FaultyInput.SITUATION, config.ages)  # of reports without a fault
         self._report: SituationReport | None = None
+        self._errand: tuple[tuple[int, ...], int] | None = None
+        self._started = False  # the policy has been asked on this errand
         self._decided: SituationReport | None = None  # what the policy saw last
+        self._decided_ns = 0  # when it saw that first
         self._choice: Choice | None = None  # its answer to that
+        self._trouble: Trouble | None = None  # the last one, as long as it bears on decisions
+        self._troubled_ns = 0
+        self._untold: Trouble | None = None  # one that no decision has told of yet
 
-    def receive(self, report: SituationReport) -> None:
-        """Take the newest report."""
+    def reconfigure(self, config: DeciderConfig) -> None:
+        """Go by other limits from now on."""
+        self.config, self.stream.limits = config, config.ages
+
+    def receive(self, report: SituationReport, now_ns: int, steady_ns: int = 0) -> None:
+        """Take the newest report; times are those of the stamps' clock and of the steady one."""
         self._report = report
+        errand = (report.route, report.route_stamp_ns)
+        if errand != self._errand:
+            self._begin(errand)
+        if report.situations is None:
+            self.doubt(Trouble(Reason(report.status), report.source, report.text), now_ns)
+            return
+        fault = self.stream.receive(report.stamp_ns, report, now_ns, steady_ns)
+        if fault is not None:
+            self.doubt(_as_trouble(fault), now_ns)
+            if fault.status is Status.OUT_OF_ORDER_INPUT:
+                self.forget()
 
     def has_reached(self, stamp_ns: int) -> bool:
         """Tell whether the newest report is of this time or later."""
         return self._report is not None and self._report.stamp_ns >= stamp_ns
 
     def forget(self) -> None:
-        """Start the policy's history anew, for instance because the clock went back."""
+        """Start the policy's history anew."""
         self._decided = None
         self._choice = None
 
-    def decide(self, now_ns: int) -> Choice:
-        """Return the decision at a time on the clock of the stamps [ns]."""
-        if isinstance(self._policy, UnusablePolicy):
-            return self._stop(self._policy.reason, FaultyInput.POLICY, self._policy.fault)
-        report = self._report
-        if report is None:
-            text = "no situation received yet"
-            return self._stop(Reason.MISSING_INPUT, FaultyInput.SITUATION, text)
-        return self._doubt(report, now_ns) or self._answer(self._policy, report)
+    def clock_went_back(self, now_ns: int) -> None:
+        """Start anew, forgetting what is of a time that has not come yet."""
+        self.forget()
+        self._started = False
+        latest_ns = now_ns + self.stream.limits.max_age_ns
+        self.stream.forget_later_than(latest_ns)
+        if self._report is not None and self._report.stamp_ns > latest_ns:
+            self._report = None
+        self._troubled_ns = min(self._troubled_ns, now_ns)
 
-    def _answer(self, policy: Policy, report: SituationReport) -> Choice:
-        if report.situations is None:
-            return self._stop(Reason(report.status), report.source, report.text, report)
-        if self._choice is not None and self._repeats(report):
+    def doubt(self, trouble: Trouble, now_ns: int) -> None:
+        """Take note of trouble: the next decision tells of it, and recovery begins after it."""
+        if trouble.reason in _SETTLED_BY_ERRAND and not self._started:
+            return  # this is how every errand begins
+        self._trouble = self._untold = trouble
+        self._troubled_ns = now_ns
+
+    def decide(self, now_ns: int, steady_ns: int = 0) -> Choice:
+        """Return the decision at a time on the clock of the stamps [ns]."""
+        policy, report = self.policy, self._report
+        if isinstance(policy, UnusablePolicy):
+            return self._stop(Trouble(policy.reason, policy.source, policy.fault))
+        present = self._present(now_ns, steady_ns)
+        if present is not None:
+            self.doubt(present, now_ns)
+        told = present or self._untold or self._recovering(now_ns)
+        self._untold = None
+        if told is not None:
+            return self._stop(told, report)
+        return self._answer(policy, now_ns)
+
+    def _begin(self, errand: tuple[tuple[int, ...], int]) -> None:
+        """Begin an errand: what happened on the one before bears on nothing."""
+        self._errand, self._started = errand, False
+        self.forget()
+        if self._trouble is not None and self._trouble.reason in _SETTLED_BY_ERRAND:
+            self._trouble = self._untold = None
+
+    def _present(self, now_ns: int, steady_ns: int) -> Trouble | None:
+        """Return why the newest report cannot be decided on."""
+        report = self._report
+        if report is not None and report.situations is None:
+            if now_ns - report.stamp_ns <= self.config.ages.max_age_ns:
+                return Trouble(Reason(report.status), report.source, report.text)
+            age_s = (now_ns - report.stamp_ns) / SECOND_NS
+            text = f"nothing heard of the situation for {age_s:.2f} s; last: {report.text}"
+            return Trouble(Reason.STALE_INPUT, FaultyInput.SITUATION, text)
+        fault = self.stream.overdue(now_ns, now_ns, steady_ns)
+        if fault is not None:
+            return _as_trouble(fault)
+        since_ns = now_ns - self._decided_ns
+        if self._repeats() and since_ns > round(self.config.max_repeat_s * SECOND_NS):
+            text = f"no new situation since the one decided on {since_ns / SECOND_NS:.2f} s ago"
+            return Trouble(Reason.FROZEN_INPUT, FaultyInput.SITUATION, text)
+        return None
+
+    def _recovering(self, now_ns: int) -> Trouble | None:
+        """Return why it is too early to ask the policy again."""
+        if self._trouble is None:
+            return None
+        good_s = (now_ns - self._troubled_ns) / SECOND_NS
+        if good_s >= self.config.recovery_s:
+            self._trouble = None
+            return None
+        text = f"good for {good_s:.1f} of {self.config.recovery_s:g} s after: {self._trouble.text}"
+        return Trouble(Reason.RECOVERING, self._trouble.source, text)
+
+    def _repeats(self) -> bool:
+        """Whether the policy has seen the newest report already."""
+        last, report = self._decided, self._report
+        return last is not None and report is not None and report.stamp_ns == last.stamp_ns
+
+    def _answer(self, policy: Policy, now_ns: int) -> Choice:
+        report = self._report
+        if report is None or report.situations is None:
+            raise InputError("situation: there is none", source=FaultyInput.SITUATION)
+        if self._choice is not None and self._repeats():
             # Asking again would put the same scene into the policy's history twice.
             return self._choice
         try:
@@ -120,54 +260,33 @@ class Decider:
         except Exception as error:  # noqa: BLE001 (a vehicle stops, whatever a policy does)
             self.forget()
             text = f"policy {policy.name} failed: {type(error).__name__}: {error}"
-            text = " ".join(text.split())
-            return self._stop(Reason.POLICY_FAILED, FaultyInput.POLICY, text, report)
-        self._decided = report
+            failed = Trouble(Reason.POLICY_FAILED, FaultyInput.POLICY, " ".join(text.split()))
+            self.doubt(failed, now_ns)
+            self._untold = None
+            return self._stop(failed, report)
+        self._decided, self._decided_ns, self._started = report, now_ns, True
         return self._choice
-
-    def _doubt(self, report: SituationReport, now_ns: int) -> Choice | None:
-        """Return Stop if the report is too old, ahead of its time or out of order."""
-        age_s = (now_ns - report.stamp_ns) / SECOND_NS
-        limit_s = self._max_age_ns / SECOND_NS
-        if now_ns - report.stamp_ns > self._max_age_ns:
-            text = f"the situation is {age_s:.2f} s old, expected at most {limit_s:g} s"
-            return self._stop(Reason.STALE_INPUT, FaultyInput.SITUATION, text, report)
-        if report.stamp_ns - now_ns > self._max_age_ns:
-            text = f"the situation is {-age_s:.2f} s ahead of the clock"
-            return self._stop(Reason.FUTURE_INPUT, FaultyInput.SITUATION, text, report)
-        # Faults bear the clock's time, situations that of the objects: only these must rise.
-        decided = self._decided if report.status is Status.OK else None
-        if decided is not None and report.stamp_ns < decided.stamp_ns:
-            back_s = (decided.stamp_ns - report.stamp_ns) / SECOND_NS
-            self.forget()
-            text = f"the situation went back in time by {back_s:.3f} s"
-            return self._stop(Reason.OUT_OF_ORDER_INPUT, FaultyInput.SITUATION, text, report)
-        return None
-
-    def _repeats(self, report: SituationReport) -> bool:
-        last = self._decided
-        return last is not None and report.stamp_ns == last.stamp_ns and report.route == last.route
 
     def _ask(self, policy: Policy, report: SituationReport, situations: Situations) -> Choice:
         last = self._decided
+        max_gap_ns = round(self.config.max_history_gap_s * SECOND_NS)
         restart = (
             last is None
-            or report.route != last.route
-            or report.stamp_ns - last.stamp_ns > self._max_gap_ns
-            or (self._interrupted and self._restart_after_fault)
+            or report.stamp_ns - last.stamp_ns > max_gap_ns
+            or (self._interrupted and self.restart_after_fault)
         )
         self._interrupted = False
         decisions = policy.decide(situations, np.array([restart]))
         decision = self._explain(decisions, situations, 0, policy)
         return Choice(decision, report.stamp_ns)
 
-    def _stop(
-        self,
-        reason: Reason,
-        source: FaultyInput,
-        text: str,
-        report: SituationReport | None = None,
-    ) -> Choice:
+    def _stop(self, why: Trouble, report: SituationReport | None = None) -> Choice:
         self._interrupted = True
-        decision = fault_decision(reason, text, self._policy.name, self._policy.hash, source)
+        decision = fault_decision(
+            why.reason, why.text, self.policy.name, self.policy.hash, why.source
+        )
         return Choice(decision, None if report is None else report.stamp_ns)
+
+
+def _as_trouble(fault: Fault) -> Trouble:
+    return Trouble(Reason(fault.status), fault.source, fault.text)

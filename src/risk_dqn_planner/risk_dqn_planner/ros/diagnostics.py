@@ -7,6 +7,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.node import Node
 
 from risk_dqn_planner.ros.qos import DIAGNOSTICS
+from risk_dqn_planner.ros.streams import SECOND_NS, RateLimits, Stream
 
 OK, WARN = DiagnosticStatus.OK, DiagnosticStatus.WARN
 ERROR, STALE = DiagnosticStatus.ERROR, DiagnosticStatus.STALE
@@ -44,10 +45,31 @@ class Diagnostics:
         self._publisher.publish(message)
 
 
-def freshness(age_s: float | None, max_age_s: float) -> tuple[bytes, str]:
-    """Return level and message for an input of this age, None if it never came."""
+def stream_status(
+    stream: Stream, now_ns: int, rates: RateLimits, recent_ns: int = SECOND_NS
+) -> tuple[bytes, str, dict[str, object]]:
+    """Return level, message and values for an input.
+
+    A fault that was noted is told of for as long as it is recent.
+    """
+    age_s, rate_hz, fault = stream.age_s(now_ns), stream.rate_hz(), stream.last_fault
+    values: dict[str, object] = {
+        "age_s": age_s,
+        "rate_hz": None if rate_hz is None else round(rate_hz, 2),
+        "received": stream.received,
+        "faults": dict(stream.faults),
+        "last_fault": "" if fault is None else fault.text,
+    }
     if age_s is None:
-        return STALE, "never received"
-    if age_s > max_age_s:
-        return STALE, f"{age_s:.2f} s old, expected at most {max_age_s:g} s"
-    return OK, "received"
+        return STALE, "never received", values
+    if age_s > stream.limits.max_input_age_s:
+        limit_s = stream.limits.max_input_age_s
+        return STALE, f"{age_s:.2f} s old, expected at most {limit_s:g} s", values
+    if fault is not None and 0 <= now_ns - fault.stamp_ns <= recent_ns:
+        return ERROR, f"{fault.status.name}: {fault.text}", values
+    if rate_hz is None:
+        return OK, "received", values
+    if not rates.min_rate_hz <= rate_hz <= rates.max_rate_hz:
+        expected = f"{rates.min_rate_hz:g} to {rates.max_rate_hz:g}"
+        return WARN, f"at {rate_hz:.1f} Hz, expected {expected}", values
+    return OK, f"received at {rate_hz:.1f} Hz", values

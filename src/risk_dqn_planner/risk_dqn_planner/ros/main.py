@@ -5,15 +5,21 @@ Asked to end means SIGINT or SIGTERM, at any time, also while the node still sta
 """
 
 import signal
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from types import FrameType
 
 import rclpy
 from rclpy.executors import ExternalShutdownException
 from rclpy.logging import get_logger
 from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import ok, try_shutdown
 
 from risk_dqn_planner.errors import PlannerError
+from risk_dqn_planner.ros.background import spinning
+from risk_dqn_planner.ros.lifecycle import ManagedNode
 
 
 def run(name: str, create: Callable[[], Node]) -> int:
@@ -40,3 +46,48 @@ def run(name: str, create: Callable[[], Node]) -> int:
             node.destroy_node()
         try_shutdown()
     return 0
+
+
+def run_managed(name: str, create: Callable[[], ManagedNode]) -> int:
+    """Create a managed node and serve it until it is shut down or asked to end; the exit code."""
+    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+    node = None
+    with _requests_to_end() as asked:
+        try:
+            node = create()
+            with spinning(node) as executor:
+                node.serve(executor, asked)
+        except KeyboardInterrupt:
+            pass
+        except PlannerError as error:
+            get_logger(name).fatal(" ".join(str(error).split()))
+            return 1
+        except Exception:
+            # What is interrupted may fail in its own way.
+            if not asked():
+                raise
+        finally:
+            if node is not None:
+                node.destroy_node()
+            try_shutdown()
+            sys.stdout.flush()
+    return 0
+
+
+@contextmanager
+def _requests_to_end() -> Iterator[Callable[[], bool]]:
+    """Let the first SIGINT or SIGTERM interrupt the main thread, and ignore the others.
+
+    Launchers and terminals send SIGINT twice; the second one must not disturb the end. Yields what
+    tells whether there was one.
+    """
+    asked: list[int] = []
+
+    def handle(number: int, frame: FrameType | None) -> None:  # noqa: ARG001 (a handler)
+        asked.append(number)
+        if len(asked) == 1:
+            raise KeyboardInterrupt
+
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, handle)
+    yield lambda: bool(asked)

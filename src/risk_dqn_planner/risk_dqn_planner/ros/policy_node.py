@@ -1,181 +1,209 @@
 # SPDX-License-Identifier: Apache-2.0
 """Publishes a decision twice a second, whatever the inputs do."""
 
+import math
 import os
+import time
 import traceback
 from functools import partial
 
 import numpy as np
-from intersection_msgs.msg import Decision, Situation
-from rclpy.node import Node
-from visualization_msgs.msg import MarkerArray
+from intersection_msgs.msg import Situation
 
-from risk_dqn_planner.decision import Reason, explain
-from risk_dqn_planner.errors import InputError, PolicyError
+from risk_dqn_planner.decision import Reason, explain, fault_decision
+from risk_dqn_planner.errors import ConfigurationError, InputError, PlannerError, PolicyError
+from risk_dqn_planner.faults import FaultyInput
 from risk_dqn_planner.policies.base import Policy
-from risk_dqn_planner.policies.supervised import SupervisorMode, supervisor_mode
+from risk_dqn_planner.policies.supervised import Supervisor, SupervisorMode, supervisor_mode
 from risk_dqn_planner.policies.supervised_loading import SOUND, config_of, load_supervised
-from risk_dqn_planner.ros import conversions, markers
-from risk_dqn_planner.ros.background import spinning
-from risk_dqn_planner.ros.clock import is_simulated, now_ns, on_clock_back, steady_timer
-from risk_dqn_planner.ros.decider import Choice, Decider, DeciderConfig, UnusablePolicy
-from risk_dqn_planner.ros.diagnostics import ERROR, OK, Diagnostics
-from risk_dqn_planner.ros.main import run
+from risk_dqn_planner.ros import conversions
+from risk_dqn_planner.ros.clock import now_ns, on_clock_back
+from risk_dqn_planner.ros.decider import (
+    Choice,
+    Decider,
+    DeciderConfig,
+    Explain,
+    Trouble,
+    UnusablePolicy,
+)
+from risk_dqn_planner.ros.decision_output import DecisionOutput
+from risk_dqn_planner.ros.diagnostics import ERROR, OK, WARN
+from risk_dqn_planner.ros.lifecycle import ManagedNode
+from risk_dqn_planner.ros.main import run_managed
 from risk_dqn_planner.ros.parameters import (
     ClockParameters,
     PolicyParameters,
-    declare,
-    declare_assumptions,
+    StandingClockParameters,
+    add_assumptions,
+    read_assumptions,
 )
 from risk_dqn_planner.ros.qos import NEWEST
+from risk_dqn_planner.ros.ticker import Ticker
+from risk_dqn_planner.safety.assumptions import SafetyAssumptions
 from risk_dqn_planner.situation.report import SituationReport
 from risk_dqn_planner.situation.warm_up import example_situation
 
-DIAGNOSTICS_PERIOD_S = 1.0
 
+class PolicyNode(ManagedNode):
+    """Asks a policy about the newest situation; what is doubtful is answered with Stop.
 
-class PolicyNode(Node):
-    """Asks a policy about the newest situation; what is doubtful is answered with Stop."""
+    It decides while it is active. Where nobody else takes it through its life it also says Stop
+    before that: while the policy is loaded, and for ever if it cannot be.
+    """
 
     def __init__(self) -> None:
         super().__init__("policy")
-        self._settings = declare(self, PolicyParameters)
-        self._mode = supervisor_mode(self._settings.supervisor)
-        self._assumptions = declare_assumptions(self, self._settings.rate_hz)
-        self._explain = partial(
-            explain, config=config_of(self._assumptions), assumptions=self._assumptions
-        )
-        config = declare(self, DeciderConfig)
-        patience_s = declare(self, ClockParameters).sim_time_patience_s
-        self._patient = is_simulated(self) and patience_s > 0.0
-        self._patience = steady_timer(self, patience_s, self._decide_now)
-        self._patience.cancel()
-        self._reason: Reason | None = None
-        self._due_ns: int | None = None  # time of a decision that waits for its situation
-        self._diagnostics = Diagnostics(self, "planner")
-        if is_simulated(self):
-            # Its clock waits for a planner that is ready: before, there is no time to decide at.
-            policy = self._load()
-            self._decider = self._decide_by(policy, config)
-            self._speak()
-        else:
-            self._decider = self._decide_by(self._not_yet(), config)
-            self._speak()
-            with spinning(self):
-                policy = self._load()
-            self._decider = self._decide_by(policy, config)
-        self._clock_back = on_clock_back(self, self._decider.forget)
+        for config in (PolicyParameters, DeciderConfig, ClockParameters, StandingClockParameters):
+            self.declared.add(config)
+        add_assumptions(self.declared)
+        self.declared.guard()
+        self._supervisor: Supervisor | None = None
+        self._output = DecisionOutput(self, PolicyParameters.marker_frame)
+        self._decider = self._undecided(Reason.POLICY_NOT_READY, "is still being loaded")
+        self._ticker = Ticker(self, self)
+        self._clock_back = on_clock_back(self, lambda: self._decider.clock_went_back(now_ns(self)))
         self.create_subscription(Situation, "~/input/situation", self._on_situation, NEWEST)
-        self.get_logger().info(f"ready with policy {policy.name}")
+        if self.autostart:
+            self._tick()
 
-    def _decide_by(self, policy: Policy | UnusablePolicy, config: DeciderConfig) -> Decider:
-        supervised = self._mode is not SupervisorMode.OFF or self._settings.policy in SOUND
-        return Decider(policy, self._explain, config, restart_after_fault=supervised)
+    def _tick(self) -> None:
+        """Begin to decide, as the parameters say."""
+        names = ("rate_hz", "sim_time_patience_s", "clock_timeout_s")
+        rate_hz, patience_s, timeout_s = (self.get_parameter(name).value for name in names)
+        self._ticker.clock_timeout_s = timeout_s
+        self._ticker.start(rate_hz, patience_s)
 
-    def _speak(self) -> None:
-        """Begin to decide twice a second, and to tell about it."""
-        self._publisher = self.create_publisher(Decision, "~/output/decision", NEWEST)
-        self._marker_publisher = self.create_publisher(MarkerArray, "~/debug/markers", NEWEST)
-        # On the node's clock: with simulated time, decisions fall on multiples of the period.
-        self.create_timer(1.0 / self._settings.rate_hz, self._on_tick)
-        steady_timer(self, DIAGNOSTICS_PERIOD_S, self._diagnostics.publish)
+    def _undecided(self, reason: Reason, what: str) -> Decider:
+        """Return what says Stop for want of a policy."""
+        name = str(self.get_parameter("policy").value)
+        return _stand_in(name, reason, FaultyInput.POLICY, f"policy {name} {what}")
 
-    def _not_yet(self) -> UnusablePolicy:
-        """Stand in for the policy while torch is loaded and the check perhaps compiled."""
-        name = self._settings.policy
-        text = f"policy {name} is still being loaded"
-        return UnusablePolicy(name, text, reason=Reason.POLICY_NOT_READY)
+    def configure(self) -> None:
+        """Load the policy and let it decide twice, so that the first real decision is not late."""
+        settings = self.declared.read(PolicyParameters)
+        assumptions = read_assumptions(self.declared, settings.rate_hz)
+        config = self.declared.read(DeciderConfig)
+        self.declared.read(ClockParameters)
+        self.declared.read(StandingClockParameters)
+        explains = partial(explain, config=config_of(assumptions), assumptions=assumptions)
+        policy = _load(settings, assumptions, explains)
+        self._supervisor = policy if isinstance(policy, Supervisor) else None
+        self._decider = Decider(policy, explains, config)
+        self.reconfigure()
+        text = f"policy {policy.name}"
+        self._output.diagnostics.set("policy", OK, text, {"hash": policy.hash})
 
-    def _load(self) -> Policy | UnusablePolicy:
-        """Load the policy and let it decide twice, so that the first real decision is not late.
+    def refuse(self, error: PlannerError) -> None:
+        """Say Stop and why, where the node takes itself through its life."""
+        reason, source = Reason.POLICY_REFUSED, FaultyInput.POLICY
+        if isinstance(error, ConfigurationError):
+            reason, source = Reason.NOT_CONFIGURED, FaultyInput.PARAMETERS
+        text, name = " ".join(str(error).split()), str(self.get_parameter("policy").value)
+        self._decider = _stand_in(name, reason, source, text)
+        self._output.diagnostics.set("policy", ERROR, text, {"reason": reason.name})
 
-        A vehicle whose policy is broken must hear Stop, not silence.
-        """
-        name = self._settings.policy
-        try:
-            policy = load_supervised(name, self._mode, self._assumptions)
-            for restart in (True, False):
-                situations = example_situation()
-                decisions = policy.decide(situations, np.array([restart]))
-                self._explain(decisions, situations, 0, policy)
-        except PolicyError as error:
-            fault = str(error)
-        except Exception as error:  # noqa: BLE001 (a vehicle stops, whatever a policy does)
-            self.get_logger().error(traceback.format_exc())
-            fault = f"policy {name} failed: {type(error).__name__}: {error}"
-        else:
-            return policy
-        fault = " ".join(fault.split())
-        self.get_logger().error(f"{fault}; every decision will be Stop")
-        return UnusablePolicy(name, fault)
+    def reconfigure(self) -> None:
+        """Go by the present values of what may change at any time."""
+        settings = self.declared.read(PolicyParameters)
+        self._decider.reconfigure(self.declared.read(DeciderConfig))
+        self._ticker.clock_timeout_s = self.declared.read(StandingClockParameters).clock_timeout_s
+        self._output.marker_frame = settings.marker_frame
+        mode = supervisor_mode(settings.supervisor)
+        supervised = mode is not SupervisorMode.OFF or settings.policy in SOUND
+        self._decider.restart_after_fault = supervised
+        if self._supervisor is not None and self._supervisor.mode is not mode:
+            self._supervisor.mode = mode
+            self._decider.forget()  # what was verified before is not what was carried out
+        delay_s = self.get_parameter("safety.actuation_delay_s").value
+        self._output.allowed_age_s = delay_s if supervised else math.inf
+
+    def activate(self) -> None:
+        """Begin to decide."""
+        self._tick()
+        self.get_logger().info(f"ready with policy {self._decider.policy.name}")
+
+    def deactivate(self) -> None:
+        """Fall silent: somebody else decides, or nobody."""
+        self._ticker.stop()
+
+    def clean_up(self) -> None:
+        """Forget the policy."""
+        self._supervisor = None
+        self._decider = self._undecided(Reason.POLICY_NOT_READY, "is not loaded")
+        self._output.diagnostics.set("policy", WARN, "unconfigured")
 
     def _on_situation(self, message: Situation) -> None:
+        stamp_ns = conversions.to_ns(message.header.stamp)
         try:
             report = conversions.situation_from_message(message)
         except InputError as error:
-            stamp_ns = conversions.to_ns(message.header.stamp)
-            report = SituationReport(stamp_ns, error.kind, str(error), source=error.source)
-        self._decider.receive(report)
-        if self._due_ns is not None and self._decider.has_reached(self._due_ns):
-            self._decide_now()
-
-    def _on_tick(self) -> None:
-        """Decide; in simulated time only once the situation of this very moment is there.
-
-        Clock and situation are different topics, and either may win the race.
-        """
-        self._decide_now()
-        self._due_ns = now_ns(self)
-        if self._patient and not self._decider.has_reached(self._due_ns):
-            self._patience.reset()
-        else:
-            self._decide_now()
-
-    def _decide_now(self) -> None:
-        """Take the decision that is due, if one is."""
-        self._patience.cancel()
-        if self._due_ns is not None:
-            self._decide(self._due_ns)
-        self._due_ns = None
-
-    def _decide(self, stamp_ns: int) -> None:
-        choice = self._decider.decide(stamp_ns)
-        message = conversions.decision_to_message(
-            choice.decision, stamp_ns, choice.situation_stamp_ns
-        )
-        self._publisher.publish(message)
-        self._tell(choice)
-        if self._marker_publisher.get_subscription_count() > 0:
-            frame_id = self._settings.marker_frame
-            self._marker_publisher.publish(
-                markers.decision_markers(choice.decision, stamp_ns, frame_id)
+            report = SituationReport(
+                stamp_ns,
+                error.kind,
+                str(error),
+                tuple(message.route),
+                source=error.source,
+                route_stamp_ns=conversions.to_ns(message.route_stamp),
             )
+        self._decider.receive(report, now_ns(self), time.monotonic_ns())
+        self._ticker.situation_came()
 
-    def _tell(self, choice: Choice) -> None:
-        """Log when decisions begin or cease to be the policy's own, and keep diagnostics."""
-        decision = choice.decision
-        faulty = decision.reason.is_fault
-        was_faulty = self._reason is None or self._reason.is_fault
-        if faulty and decision.reason is not self._reason:
-            self.get_logger().warning(decision.text)
-        elif was_faulty and not faulty:
-            self.get_logger().info("deciding")
-        self._reason = decision.reason
-        values = {
-            "action": decision.action.name,
-            "reason": decision.reason.name,
-            "faulty_input": decision.faulty_input.name,
-            "policy": decision.policy_name,
-            "policy_hash": decision.policy_hash,
-            "supervisor": decision.supervision.name,
-        }
-        if decision.proposed is not None:
-            values["proposed"] = decision.proposed.name
-        self._diagnostics.set("decision", ERROR if faulty else OK, decision.text, values)
+    def has_reached(self, stamp_ns: int) -> bool:
+        """Tell whether the situation of this time or a later one is there."""
+        return self._decider.has_reached(stamp_ns)
+
+    def clock_stands(self, stamp_ns: int, stood_s: float) -> None:
+        """Say Stop although no time passes."""
+        reason, text = Reason.FROZEN_INPUT, f"the clock has stood still for {stood_s:.1f} s"
+        if stamp_ns == 0:
+            reason, text = Reason.MISSING_INPUT, "no time received on /clock yet"
+        self._decider.doubt(Trouble(reason, FaultyInput.CLOCK, text), stamp_ns)
+        self.decide(stamp_ns)
+
+    def decide(self, stamp_ns: int) -> None:
+        """Take the decision of a time, whatever it takes."""
+        decider = self._decider
+        try:
+            choice = decider.decide(stamp_ns, time.monotonic_ns())
+        except Exception as error:  # noqa: BLE001 (a vehicle stops, whatever fails)
+            self.get_logger().error(traceback.format_exc(), throttle_duration_sec=10.0)
+            decider.forget()
+            text = f"internal error: {' '.join(repr(error).split())}"
+            choice = Choice(fault_decision(Reason.INTERNAL_ERROR, text), None)
+        self._output.publish(choice, stamp_ns, decider.stream)
+
+
+def _stand_in(name: str, reason: Reason, source: FaultyInput, text: str) -> Decider:
+    stand_in = UnusablePolicy(name, text, reason=reason, source=source)
+    return Decider(stand_in, explain, DeciderConfig())
+
+
+def _load(settings: PolicyParameters, assumptions: SafetyAssumptions, explains: Explain) -> Policy:
+    """Return a policy that has decided already.
+
+    Raises:
+        PlannerError: it cannot be used.
+    """
+    name = settings.policy
+    try:
+        # A supervisor that is off may be switched on later.
+        policy = load_supervised(name, SupervisorMode.REPORT, assumptions)
+        if isinstance(policy, Supervisor):
+            policy.mode = supervisor_mode(settings.supervisor)
+        for restart in (True, False):
+            situations = example_situation()
+            decisions = policy.decide(situations, np.array([restart]))
+            explains(decisions, situations, 0, policy)
+    except PlannerError:
+        raise
+    except Exception as error:
+        text = f"policy {name} failed: {type(error).__name__}: {error}"
+        raise PolicyError(" ".join(text.split())) from error
+    return policy
 
 
 def main() -> int:
     """Run the node; the exit code."""
     # One decision is too small to share among threads of torch; sharing would only vary its time.
     os.environ.setdefault("OMP_NUM_THREADS", "1")
-    return run("policy", PolicyNode)
+    return run_managed("policy", PolicyNode)

@@ -1,43 +1,60 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where the situation node's reports go: topic, log and diagnostics."""
+"""Where the situation node's reports go: topic, RViz, log and diagnostics."""
 
 import time
 
 from intersection_msgs.msg import Situation
 from rclpy.node import Node
+from visualization_msgs.msg import MarkerArray
 
+from risk_dqn_planner.intersection.model import IntersectionModel
+from risk_dqn_planner.ros import markers
 from risk_dqn_planner.ros.clock import now_ns
 from risk_dqn_planner.ros.conversions import situation_to_message
-from risk_dqn_planner.ros.diagnostics import ERROR, OK, Diagnostics, freshness
+from risk_dqn_planner.ros.diagnostics import ERROR, OK, STALE, WARN, Diagnostics, stream_status
 from risk_dqn_planner.ros.qos import NEWEST
-from risk_dqn_planner.ros.synchroniser import Input, Synchroniser
+from risk_dqn_planner.ros.streams import InputRates
+from risk_dqn_planner.ros.synchroniser import Synchroniser
+from risk_dqn_planner.situation.inputs import Perception
 from risk_dqn_planner.situation.pipeline import SituationPipeline
-from risk_dqn_planner.situation.report import SituationReport, Status
+from risk_dqn_planner.situation.report import Fault, SituationReport, Status
 
 
 class SituationOutput:
     """Publishes reports and tells when the situation becomes available or ceases to be."""
 
-    def __init__(self, node: Node, frame_id: str) -> None:
+    def __init__(self, node: Node) -> None:
         self._node = node
-        self._frame_id = frame_id
+        self.frame_id = "map"
+        self.rates = InputRates()
         self._publisher = node.create_publisher(Situation, "~/output/situation", NEWEST)
+        self._marker_publisher = node.create_publisher(MarkerArray, "~/debug/markers", NEWEST)
         self._diagnostics = Diagnostics(node, "planner")
-        self._status: Status | None = None
+        self._told: tuple[Status, object] | None = None
         self._sent_ns = self._sent_steady_ns = 0
 
     def publish(self, report: SituationReport) -> None:
-        """Publish a report, and log it if its status differs from the last one's."""
-        self._publisher.publish(situation_to_message(report, self._frame_id))
+        """Publish a report, and log it if its fault differs from the last one's."""
+        self._publisher.publish(situation_to_message(report, self.frame_id))
         self._sent_ns, self._sent_steady_ns = now_ns(self._node), time.monotonic_ns()
-        if report.status is not self._status:
+        fault = (report.status, report.source)
+        if fault != self._told:
             if report.status is Status.OK:
                 self._node.get_logger().info("situation available")
             else:
                 self._node.get_logger().warning(f"{report.status.name}: {report.text}")
-        self._status = report.status
+        self._told = fault
         level = OK if report.status is Status.OK else ERROR
-        self._diagnostics.set("situation", level, report.text or "available")
+        values = {"status": report.status.name, "faulty_input": report.source.name}
+        self._diagnostics.set("situation", level, report.text or "available", values)
+
+    def show(
+        self, model: IntersectionModel | None, report: SituationReport, seen: Perception
+    ) -> None:
+        """Publish markers of a report, if anybody looks at them."""
+        if model is not None and self._marker_publisher.get_subscription_count() > 0:
+            shown = markers.situation_markers(model, report, seen, self.frame_id)
+            self._marker_publisher.publish(shown)
 
     def silent_for(self, span_ns: int) -> bool:
         """Tell whether nothing has been published for this long, by simulated or by real time."""
@@ -45,16 +62,23 @@ class SituationOutput:
         return max(simulated_ns, time.monotonic_ns() - self._sent_steady_ns) >= span_ns
 
     def diagnose(
-        self, synchroniser: Synchroniser, pipeline: SituationPipeline, max_age_s: float
+        self,
+        synchroniser: Synchroniser,
+        pipeline: SituationPipeline | None,
+        state: str,
+        refusal: Fault | None,
     ) -> None:
-        """Publish the state of each input."""
-        now = now_ns(self._node)
-        for source in Input:
-            age_s = synchroniser.age_s(source, now)
-            level, text = freshness(age_s, max_age_s)
-            self._diagnostics.set(source.value, level, text, {"age_s": age_s})
-        followed = pipeline.model is not None
-        text = "followed" if followed else str(pipeline.route_fault or "never received")
-        level = OK if followed else ERROR
-        self._diagnostics.set("route", level, text, {"lanelets": pipeline.route})
+        """Publish the state of the node and of each input."""
+        level = OK if state == "active" else WARN
+        text = state if refusal is None else f"{state}: {refusal.text}"
+        self._diagnostics.set("node", level if refusal is None else ERROR, text)
+        if state == "active" and pipeline is not None:
+            now = now_ns(self._node)
+            for source, stream in synchroniser.streams.items():
+                level, text, values = stream_status(stream, now, self.rates.of(source))
+                self._diagnostics.set(str(source), level, text, values)
+            followed, fault = pipeline.model is not None, pipeline.route_fault
+            level = OK if followed else STALE if fault is None else ERROR
+            text = "followed" if followed else str(fault or "never received")
+            self._diagnostics.set("route", level, text, {"lanelets": pipeline.route})
         self._diagnostics.publish()

@@ -35,6 +35,7 @@ class SituationPipeline:
         self._builders: dict[Route, SituationBuilder] = {}
         self._builder: SituationBuilder | None = None
         self.route: Route = ()
+        self.route_stamp_ns = 0
         self.route_fault: PlannerError | None = None
 
     @property
@@ -42,9 +43,13 @@ class SituationPipeline:
         """The selected route's model; None without a usable route."""
         return None if self._builder is None else self._builder.model
 
-    def select(self, route: Route) -> None:
-        """Take a route from now on; one that does not fit the map is reported, not raised."""
-        self.route, self.route_fault, self._builder = route, None, None
+    def select(self, route: Route, stamp_ns: int = 0) -> None:
+        """Take a route from now on; one that does not fit the map is reported, not raised.
+
+        What the memory knows is of the errand before, and forgotten.
+        """
+        self.route, self.route_stamp_ns = route, stamp_ns
+        self.route_fault, self._builder = None, None
         try:
             self._builder = self._builder_of(route)
             if self._builder.memory is not None:
@@ -79,6 +84,7 @@ class SituationPipeline:
             status=Status.OK,
             text="",
             route=self.route,
+            route_stamp_ns=self.route_stamp_ns,
             stop_line_derived=self._builder.model.stop_line.derived,
             situations=situations,
         )
@@ -98,4 +104,5 @@ class SituationPipeline:
             source=fault.source,
             text=fault.text,
             route=self.route,
+            route_stamp_ns=self.route_stamp_ns,
         )

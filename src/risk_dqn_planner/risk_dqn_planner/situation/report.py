@@ -26,7 +26,8 @@ class SituationReport:
 
     stamp_ns: time of the perceived objects; of the report itself where there is a fault [ns].
     text: one sentence on the fault, empty when OK. situations: None exactly if there is a fault.
-    source: what is at fault, NO_INPUT when OK.
+    source: what is at fault, NO_INPUT when OK. route_stamp_ns: of the route's message; another
+    one, or another route, is a new errand.
     """
 
     stamp_ns: int
@@ -36,6 +37,7 @@ class SituationReport:
     stop_line_derived: bool = False
     situations: Situations | None = None
     source: FaultyInput = FaultyInput.NO_INPUT
+    route_stamp_ns: int = 0
 
 
 def fault_of(stamp_ns: int, error: PlannerError) -> Fault:

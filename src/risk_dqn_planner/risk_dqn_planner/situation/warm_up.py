@@ -19,7 +19,7 @@ from risk_dqn_planner.intersection.model import (
 )
 from risk_dqn_planner.situation.builder import SituationBuilder
 from risk_dqn_planner.situation.config import SituationConfig
-from risk_dqn_planner.situation.inputs import EgoPose, object_arrays
+from risk_dqn_planner.situation.inputs import EgoPose, Perception, object_arrays
 from risk_dqn_planner.situation.situations import Floats, Situations
 from risk_dqn_planner.vehicle import VehicleDimensions
 
@@ -62,9 +62,14 @@ def square(half_size_m: float) -> Floats:
     return np.array([[-h, -h], [h, -h], [h, h], [-h, h]])
 
 
-def example_situation(config: SituationConfig | None = None) -> Situations:
+def example_perception() -> Perception:
     """Return what the ego sees 20 m before the crossing: one vehicle, the lane free for 40 m."""
-    builder = SituationBuilder(crossing_model(), config)
     ego = EgoPose(-20.0, 0.0, 0.0, EGO_SPEED_MPS)
     vehicle = object_arrays([[0.0, -30.0, math.pi / 2, EGO_SPEED_MPS]])
-    return builder.build(ego, vehicle, square(40.0))
+    return Perception(ego, vehicle, square(40.0))
+
+
+def example_situation(config: SituationConfig | None = None) -> Situations:
+    """Return the situation of the example: 20 m before the crossing."""
+    builder = SituationBuilder(crossing_model(), config)
+    return builder.build(*example_perception())

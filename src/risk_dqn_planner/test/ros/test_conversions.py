@@ -221,9 +221,9 @@ def test_the_codes_of_explanations_are_those_of_the_message() -> None:
 def test_every_fault_of_a_situation_is_a_reason_to_stop_with_the_same_name_and_code() -> None:
     faults = {status.name: int(status) for status in Status if status is not Status.OK}
     reasons = {reason.name: int(reason) for reason in Reason if reason.is_fault}
-    own = {name: code for name, code in reasons.items() if name.startswith("POLICY_")}
+    own = {name: code for name, code in reasons.items() if code >= Reason.POLICY_NOT_READY}
     assert reasons == faults | own
-    assert sorted(own) == ["POLICY_FAILED", "POLICY_NOT_READY", "POLICY_REFUSED"]
+    assert sorted(own) == ["POLICY_FAILED", "POLICY_NOT_READY", "POLICY_REFUSED", "RECOVERING"]
 
 
 def test_a_situation_with_a_number_that_is_not_finite_is_refused() -> None:

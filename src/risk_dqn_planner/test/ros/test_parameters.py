@@ -17,17 +17,22 @@ from rclpy.parameter import Parameter
 from risk_dqn_planner.errors import ConfigurationError
 from risk_dqn_planner.intersection.config import IntersectionConfig
 from risk_dqn_planner.ros.decider import DeciderConfig
+from risk_dqn_planner.ros.declaration import Declared, declare
+from risk_dqn_planner.ros.lifecycle import LifecycleParameters
 from risk_dqn_planner.ros.parameters import (
     ClockParameters,
     EgoParameters,
     MapParameters,
     PolicyParameters,
-    declare,
-    declare_assumptions,
+    StandingClockParameters,
+    add_assumptions,
+    read_assumptions,
 )
+from risk_dqn_planner.ros.streams import AgeLimits, InputRates
 from risk_dqn_planner.ros.synchroniser import SynchroniserConfig
 from risk_dqn_planner.safety.assumptions import SafetyAssumptions
 from risk_dqn_planner.situation.config import SituationConfig
+from risk_dqn_planner.situation.limits import PlausibilityLimits
 from risk_dqn_planner.vehicle import EgoLimits, TrafficLimits, VehicleDimensions
 
 MakeNode = Callable[..., Node]
@@ -126,6 +131,93 @@ def test_a_map_without_a_file_or_an_origin_is_refused_by_name() -> None:
         MapParameters(map_file="x.osm", map_origin_latitude=49.0).load()
 
 
+class Managed:
+    """A managed node's parameters, and what became of them."""
+
+    def __init__(self, node: Node) -> None:
+        self.node = node
+        self.state = "unconfigured"
+        self.changes = 0
+        self.declared = Declared(node, lambda: self.state, self._changed)
+        self.declared.add(LifecycleParameters)
+        self.declared.add(MapParameters)
+        self.declared.add(DeciderConfig)
+        self.declared.add(PolicyParameters)
+        self.declared.guard()
+        for config in (LifecycleParameters, MapParameters, DeciderConfig, PolicyParameters):
+            self.declared.read(config)
+
+    def _changed(self) -> None:
+        self.changes += 1
+
+    def set(self, name: str, value: object) -> str:
+        """Set a parameter; why that was refused, or "ok"."""
+        result = self.node.set_parameters([Parameter(name, value=value)])[0]
+        return "ok" if result.successful else str(result.reason)
+
+
+@pytest.fixture
+def managed(make_node: MakeNode) -> Managed:
+    return Managed(make_node())
+
+
+def test_what_may_change_at_any_time_takes_effect_at_once(managed: Managed) -> None:
+    managed.state = "active"
+    assert managed.set("max_situation_age_s", 0.3) == "ok"
+    assert managed.changes == 1
+    assert managed.declared.read(DeciderConfig).max_situation_age_s == 0.3
+
+
+def test_what_is_loaded_may_change_only_before_that_and_the_refusal_says_so(
+    managed: Managed,
+) -> None:
+    managed.state = "active"
+    refusal = managed.set("map_file", "other.osm")
+    assert refusal == (
+        "parameter map_file may change while the node is unconfigured, but it is active: "
+        "deactivate it, clean it up, set the parameter and configure it again"
+    )
+    assert managed.node.get_parameter("map_file").value == ""
+    managed.state = "unconfigured"
+    assert managed.set("map_file", "other.osm") == "ok"
+    assert managed.declared.read(MapParameters).map_file == "other.osm"
+
+
+@pytest.mark.parametrize("name", ["autostart", "use_sim_time"])
+def test_what_is_read_at_the_start_never_changes(managed: Managed, name: str) -> None:
+    assert managed.set(name, False) == (
+        f"parameter {name} is read once, when the node starts; start the node with another value"
+    )
+
+
+def test_a_change_that_makes_no_sense_is_refused_in_the_words_of_the_configuration(
+    managed: Managed,
+) -> None:
+    managed.state = "active"
+    refusal = managed.set("supervisor", "strict")
+    assert refusal == "supervisor is 'strict', expected one of: off, report, enforce"
+    assert "recovery_s" in managed.set("recovery_s", -1.0)
+    assert managed.changes == 0
+
+
+def test_every_parameter_says_when_it_may_change(managed: Managed) -> None:
+    constraints = {
+        name: managed.node.describe_parameter(name).additional_constraints
+        for name in ("recovery_s", "map_file", "autostart")
+    }
+    assert constraints == {
+        "recovery_s": "may change at any time",
+        "map_file": "may change while the node is unconfigured",
+        "autostart": "is read once, when the node starts",
+    }
+
+
+def assumptions(node: Node, rate_hz: float) -> SafetyAssumptions:
+    declared = Declared(node, lambda: "unconfigured", lambda: None)
+    add_assumptions(declared)
+    return read_assumptions(declared, rate_hz)
+
+
 def test_the_supervisor_assumes_what_its_parameters_say(make_node: MakeNode) -> None:
     node = make_node(
         safety__ego__braking_mps2=2.5,
@@ -133,7 +225,7 @@ def test_the_supervisor_assumes_what_its_parameters_say(make_node: MakeNode) -> 
         safety__vehicle__length_m=5.0,
         safety__speed_error_mps=0.5,
     )
-    assert declare_assumptions(node, rate_hz=4.0) == SafetyAssumptions(
+    assert assumptions(node, rate_hz=4.0) == SafetyAssumptions(
         decision_period_s=0.25,
         speed_error_mps=0.5,
         ego=EgoLimits(braking_mps2=2.5),
@@ -148,7 +240,7 @@ def test_the_supervisor_assumes_what_its_parameters_say(make_node: MakeNode) -> 
 @pytest.mark.parametrize("name", ["decision_period_s", "traffic.default_speed_limit_mps"])
 def test_what_would_have_no_effect_is_no_parameter(make_node: MakeNode, name: str) -> None:
     node = make_node()
-    declare_assumptions(node, rate_hz=2.0)
+    assumptions(node, rate_hz=2.0)
     assert not node.has_parameter(f"safety.{name}")
 
 
@@ -164,7 +256,7 @@ def test_assumptions_that_contradict_each_other_are_refused(
     make_node: MakeNode, overrides: dict[str, object], words: str
 ) -> None:
     with pytest.raises(ConfigurationError, match=words):
-        declare_assumptions(make_node(**overrides), rate_hz=2.0)
+        assumptions(make_node(**overrides), rate_hz=2.0)
 
 
 def test_an_unknown_supervisor_is_refused_with_those_there_are() -> None:
@@ -194,14 +286,22 @@ def test_the_parameter_file_holds_all_parameters_with_their_defaults() -> None:
     intersection = dataclasses.asdict(IntersectionConfig())
     del intersection["sensor_range_m"]  # the situation's own
     situation = defaults(
-        MapParameters(), EgoParameters(), SynchroniserConfig(), ClockParameters(), SituationConfig()
-    ) | flat({"intersection": intersection})
+        LifecycleParameters(), MapParameters(), EgoParameters(), AgeLimits(), SynchroniserConfig(),
+        ClockParameters(), SituationConfig(),
+    ) | flat(
+        {
+            "intersection": intersection,
+            "plausibility": dataclasses.asdict(PlausibilityLimits()),
+            "rates": dataclasses.asdict(InputRates()),
+        }
+    )  # fmt: skip
     safety = dataclasses.asdict(SafetyAssumptions())
     del safety["decision_period_s"]  # follows from rate_hz
     del safety["traffic"]["default_speed_limit_mps"], safety["vehicle"]["width_m"]  # without use
-    policy = defaults(PolicyParameters(), DeciderConfig(), ClockParameters()) | flat(
-        {"safety": safety}
-    )
+    policy = defaults(
+        LifecycleParameters(), PolicyParameters(), DeciderConfig(), ClockParameters(),
+        StandingClockParameters(),
+    ) | flat({"safety": safety})  # fmt: skip
     for argument in (
         "map_file", "map_origin_latitude", "map_origin_longitude", "map_projector", "memory"
     ):  # fmt: skip

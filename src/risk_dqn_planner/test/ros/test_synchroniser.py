@@ -4,23 +4,32 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from risk_dqn_planner.ros.synchroniser import Frame, Input, Synchroniser, SynchroniserConfig
+from risk_dqn_planner.ros.streams import AgeLimits
+from risk_dqn_planner.ros.synchroniser import INPUTS, Frame, Synchroniser, SynchroniserConfig
 from risk_dqn_planner.situation.report import Fault, FaultyInput, Status
 
 MS = 1_000_000
-ODOMETRY, AREA, OBJECTS = Input.ODOMETRY, Input.VISIBLE_AREA, Input.OBJECTS
+ODOMETRY, AREA, OBJECTS = INPUTS
+# Far behind all stamps, where no input is ahead of it: the clock of most tests.
+ANY_LEAD = AgeLimits(max_input_age_s=0.5, max_input_ahead_s=1000.0)
 
 
 def synchroniser() -> Synchroniser:
-    return Synchroniser(SynchroniserConfig(sync_timeout_s=0.05, max_input_age_s=0.5))
+    return Synchroniser(SynchroniserConfig(sync_timeout_s=0.05), ANY_LEAD)
 
 
-def give(sync: Synchroniser, source: Input, stamp_ms: int, steady_ms: int = 0) -> None:
-    sync.receive(source, stamp_ms * MS, f"{source.value} {stamp_ms}", steady_ms * MS)
+def give(
+    sync: Synchroniser, source: FaultyInput, stamp_ms: int, steady_ms: int = 0, now_ms: int = 0
+) -> None:
+    sync.receive(source, stamp_ms * MS, f"{source} {stamp_ms}", now_ms * MS, steady_ms * MS)
 
 
-def take(sync: Synchroniser, steady_ms: int = 0) -> Frame | Fault | None:
-    return sync.take(steady_ms * MS)
+def take(sync: Synchroniser, steady_ms: int = 0, now_ms: int = 0) -> Frame | Fault | None:
+    return sync.take(now_ms * MS, steady_ms * MS)
+
+
+def overdue(sync: Synchroniser, now_ms: int, steady_ms: int = 1000_000) -> Fault | None:
+    return sync.overdue(now_ms * MS, steady_ms * MS)
 
 
 def frame(stamp_ms: int, odometry_ms: int, area_ms: int) -> Frame:
@@ -138,7 +147,7 @@ def test_a_repeated_stamp_is_in_order() -> None:
 
 def test_inputs_that_have_stopped_are_overdue_by_the_clock_of_the_stamps() -> None:
     sync = synchroniser()
-    assert sync.overdue(0) == Fault(
+    assert overdue(sync, 0) == Fault(
         0,
         Status.MISSING_INPUT,
         FaultyInput.ODOMETRY,
@@ -146,8 +155,8 @@ def test_inputs_that_have_stopped_are_overdue_by_the_clock_of_the_stamps() -> No
     )
     for source in (ODOMETRY, AREA, OBJECTS):
         give(sync, source, 1000)
-    assert sync.overdue(1500 * MS) is None
-    assert sync.overdue(1501 * MS) == Fault(
+    assert overdue(sync, 1500) is None
+    assert overdue(sync, 1501) == Fault(
         1501 * MS,
         Status.STALE_INPUT,
         FaultyInput.ODOMETRY,
@@ -160,7 +169,7 @@ def test_inputs_ahead_of_the_clock_are_not_overdue() -> None:
     sync = synchroniser()
     for source in (ODOMETRY, AREA, OBJECTS):
         give(sync, source, 1000)
-    assert sync.overdue(0) is None
+    assert overdue(sync, 0) is None
     assert take(sync) == frame(1000, 1000, 1000)
 
 
@@ -170,7 +179,7 @@ def test_when_the_clock_jumps_back_the_new_time_starts_without_a_fault() -> None
         give(sync, source, 60_000)
     take(sync)
     sync.clock_went_back(5000 * MS)
-    assert sync.age_s(OBJECTS, 5000 * MS) is None
+    assert sync.streams[OBJECTS].age_s(5000 * MS) is None
     for source in (ODOMETRY, AREA, OBJECTS):
         give(sync, source, 5000)
     assert take(sync) == frame(5000, 5000, 5000)
@@ -185,16 +194,79 @@ def test_when_the_clock_jumps_back_after_the_new_messages_they_are_kept() -> Non
     assert take(sync) == frame(5000, 5000, 5000)
 
 
-ARRIVALS = st.lists(st.tuples(st.sampled_from(Input), st.integers(0, 400)), max_size=40)
+def test_objects_that_come_late_are_stale_by_the_clock() -> None:
+    sync = synchroniser()
+    for source in (ODOMETRY, AREA, OBJECTS):
+        give(sync, source, 1000, now_ms=1600)
+    assert take(sync, now_ms=1600) == Fault(
+        1600 * MS, Status.STALE_INPUT, ODOMETRY, "odometry is 0.60 s old, expected at most 0.5 s"
+    )
+
+
+def test_an_input_far_ahead_of_the_clock_is_a_fault_for_as_long_as_it_is() -> None:
+    ages = AgeLimits(max_input_age_s=0.5, max_input_ahead_s=0.2)
+    sync = Synchroniser(SynchroniserConfig(), ages)
+    give(sync, ODOMETRY, 9000, now_ms=1000)
+    give(sync, AREA, 1000, now_ms=1000)
+    expected = Fault(
+        1200 * MS,
+        Status.FUTURE_INPUT,
+        ODOMETRY,
+        "odometry is 8.00 s ahead of the clock, expected at most 0.2 s",
+    )
+    assert take(sync, now_ms=1000) == expected
+    give(sync, OBJECTS, 1000, now_ms=1000)
+    late = overdue(sync, 1000)
+    assert late is not None
+    assert (late.status, late.source) == (Status.FUTURE_INPUT, ODOMETRY)
+    again = take(sync, now_ms=1000)
+    assert isinstance(again, Fault)
+    assert (again.status, again.source) == (Status.FUTURE_INPUT, ODOMETRY)
+
+
+def test_faults_are_told_as_of_now_or_their_reader_would_doubt_them() -> None:
+    sync = Synchroniser(SynchroniserConfig(), AgeLimits(0.5, 0.2))
+    give(sync, OBJECTS, 5000, now_ms=5000)
+    give(sync, OBJECTS, 100, now_ms=5000)
+    fault = take(sync, now_ms=5000)
+    assert isinstance(fault, Fault)
+    assert (fault.stamp_ns, fault.status) == (5000 * MS, Status.OUT_OF_ORDER_INPUT)
+
+
+def test_limits_may_change_while_it_runs() -> None:
+    sync = synchroniser()
+    for source in (ODOMETRY, AREA, OBJECTS):
+        give(sync, source, 1000)
+    sync.reconfigure(SynchroniserConfig(), AgeLimits(0.1, 0.2))
+    assert overdue(sync, 1100) is None
+    fault = overdue(sync, 1101)
+    assert fault is not None
+    assert fault.status is Status.STALE_INPUT
+
+
+def test_after_a_restart_nothing_has_come_yet() -> None:
+    sync = synchroniser()
+    for source in (ODOMETRY, AREA, OBJECTS):
+        give(sync, source, 1000)
+    sync.restart()
+    assert take(sync) is None
+    fault = overdue(sync, 1000)
+    assert fault is not None
+    assert fault.status is Status.MISSING_INPUT
+
+
+ARRIVALS = st.lists(st.tuples(st.sampled_from(INPUTS), st.integers(0, 400)), max_size=40)
 
 
 @given(ARRIVALS)
-def test_a_frame_never_holds_an_input_older_than_allowed(arrivals: list[tuple[Input, int]]) -> None:
+def test_a_frame_never_holds_an_input_older_than_allowed(
+    arrivals: list[tuple[FaultyInput, int]],
+) -> None:
     sync = synchroniser()
     stamp = 0
     for steady, (source, step) in enumerate(arrivals):
         stamp += step
-        sync.receive(source, stamp * MS, stamp, steady * 100 * MS)
+        sync.receive(source, stamp * MS, stamp, 0, steady * 100 * MS)
         due = take(sync, steady_ms=(steady + 1) * 100)
         if isinstance(due, Frame):
             assert due.objects == due.stamp_ns // MS

@@ -62,10 +62,8 @@ class Mailbox(Generic[Message]):
 
 
 def _has_heard(decision: Decision) -> bool:
-    """Whether the policy is there and knows what the situation node says."""
-    return bool(
-        decision.reason != Decision.POLICY_NOT_READY and decision.faulty_input != Decision.SITUATION
-    )
+    """Whether the policy knows what the situation node says."""
+    return decision.faulty_input not in {Decision.SITUATION, Decision.CLOCK}
 
 
 class PlannerLink:
@@ -109,7 +107,7 @@ class PlannerLink:
         """
         deadline = time.monotonic() + timeout_s
         while time.monotonic() < deadline and not self.closed:
-            if not (self.connected() and inputs_are_read()):
+            if not (self.connected() and inputs_are_read() and self._policy_is_loaded()):
                 time.sleep(_LOOK_AGAIN_S)
                 continue
             self._met_ns += DECISION_PERIOD_NS
@@ -118,6 +116,11 @@ class PlannerLink:
             if decision is not None and _has_heard(decision):
                 return (self._met_ns + EPISODE_GAP_NS) // _START_NS * _START_NS + _START_NS
         return None
+
+    def _policy_is_loaded(self) -> bool:
+        """Whether the policy is there: without a time, too, it says what is missing."""
+        decision = self.decisions.newest()[1]
+        return decision is not None and decision.reason != Decision.POLICY_NOT_READY
 
     def close(self) -> None:
         """Stop waiting for answers."""

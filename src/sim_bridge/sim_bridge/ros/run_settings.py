@@ -23,8 +23,15 @@ DEFAULT_PROJECTOR = "utm"
 DEFAULT_SCENARIO = "base"
 DEFAULT_MEMORY = SituationConfig.memory
 
-# Lock-step has time: on a busy computer a situation may reach the policy long after the clock.
-_LOCKSTEP: dict[str, ParameterValue] = {"use_sim_time": True, "sim_time_patience_s": 1.0}
+# Lock-step has time: on a busy computer a situation may reach the policy long after the clock,
+# which stands until both have answered, half a second behind the inputs at most.
+_LOCKSTEP: dict[str, ParameterValue] = {
+    "use_sim_time": True,
+    "sim_time_patience_s": 1.0,
+    "clock_timeout_s": 30.0,
+    "max_input_ahead_s": 0.5,
+    "max_situation_ahead_s": 0.5,
+}
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,9 @@ from rclpy.node import Node
 
 from risk_dqn_planner.errors import PlannerError
 from risk_dqn_planner.ros.clock import steady_timer
+from risk_dqn_planner.ros.declaration import declare
 from risk_dqn_planner.ros.main import run
-from risk_dqn_planner.ros.parameters import MapParameters, declare
+from risk_dqn_planner.ros.parameters import MapParameters
 from sim_bridge.ros.building import SimulationShelf
 from sim_bridge.ros.episodes import EpisodePlayer
 from sim_bridge.ros.input_loss import InputLoss

@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Where decisions go: topic, RViz, log and diagnostics."""
+
+from intersection_msgs.msg import Decision
+from rclpy.node import Node
+from visualization_msgs.msg import MarkerArray
+
+from risk_dqn_planner.decision import Reason
+from risk_dqn_planner.policies.base import Supervision
+from risk_dqn_planner.ros import conversions, markers
+from risk_dqn_planner.ros.clock import now_ns, steady_timer
+from risk_dqn_planner.ros.decider import Choice
+from risk_dqn_planner.ros.diagnostics import ERROR, OK, WARN, Diagnostics, stream_status
+from risk_dqn_planner.ros.qos import NEWEST
+from risk_dqn_planner.ros.streams import RateLimits, Stream
+
+_DIAGNOSTICS_PERIOD_S = 1.0
+_RATES = RateLimits()
+
+
+class DecisionOutput:
+    """Publishes decisions and tells when they begin or cease to be the policy's own."""
+
+    def __init__(self, node: Node, marker_frame: str) -> None:
+        self._node = node
+        self.marker_frame = marker_frame
+        self.allowed_age_s = float("inf")  # of situations, by what the supervisor assumes
+        self._publisher = node.create_publisher(Decision, "~/output/decision", NEWEST)
+        self._marker_publisher = node.create_publisher(MarkerArray, "~/debug/markers", NEWEST)
+        self.diagnostics = Diagnostics(node, "planner")
+        self._reason: Reason | None = None
+        self._stream: Stream | None = None
+        steady_timer(node, _DIAGNOSTICS_PERIOD_S, self._diagnose)
+
+    def publish(self, choice: Choice, stamp_ns: int, stream: Stream) -> None:
+        """Publish a decision taken at a time; `stream`: the situations it is taken on."""
+        self._stream = stream
+        message = conversions.decision_to_message(
+            choice.decision, stamp_ns, choice.situation_stamp_ns
+        )
+        self._publisher.publish(message)
+        self._tell(choice)
+        if self._marker_publisher.get_subscription_count() > 0:
+            shown = markers.decision_markers(choice.decision, stamp_ns, self.marker_frame)
+            self._marker_publisher.publish(shown)
+
+    def _tell(self, choice: Choice) -> None:
+        """Log changes between the policy and faults, and keep the diagnostics."""
+        decision = choice.decision
+        was_fault = self._reason is None or self._reason.is_fault
+        if decision.reason.is_fault and decision.reason is not self._reason:
+            self._node.get_logger().warning(f"{decision.reason.name}: {decision.text}")
+        elif was_fault and not decision.reason.is_fault:
+            self._node.get_logger().info("deciding")
+        self._reason = decision.reason
+        values = {
+            "action": decision.action.name,
+            "reason": decision.reason.name,
+            "faulty_input": decision.faulty_input.name,
+            "policy": decision.policy_name,
+            "policy_hash": decision.policy_hash,
+            "supervisor": decision.supervision.name,
+        }
+        if decision.proposed is not None:
+            values["proposed"] = decision.proposed.name
+        level = ERROR if decision.reason.is_fault else OK
+        if decision.supervision is Supervision.OBJECTED:
+            level = max(level, WARN)
+        self.diagnostics.set("decision", level, decision.text, values)
+
+    def _diagnose(self) -> None:
+        if self._stream is not None:
+            now = now_ns(self._node)
+            level, text, values = stream_status(self._stream, now, _RATES)
+            age_s = self._stream.age_s(now)
+            if level == OK and age_s is not None and age_s > self.allowed_age_s:
+                level = WARN
+                text = (
+                    f"{age_s:.2f} s old, but the supervisor assumes that decisions take effect "
+                    f"within {self.allowed_age_s:g} s (safety.actuation_delay_s)"
+                )
+            self.diagnostics.set("situation", level, text, values)
+        self.diagnostics.publish()

@@ -1,0 +1,161 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The managed nodes over their services: every state, what may change in it, and its end."""
+
+import os
+import signal
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from intersection_msgs.msg import Decision
+from lifecycle_driver import LifecycleDriver
+from rclpy.node import Node
+
+from sim_bridge.ros import topics
+from sim_bridge.ros.process import NodeProcess
+from sim_bridge.ros.run_settings import RunSettings
+from sim_bridge.ros.session import ros_session, wait_until
+
+pytestmark = pytest.mark.ros
+
+PATIENCE_S = 240.0
+END_S = 20.0
+SITUATION, POLICY = 0, 1
+Start = Callable[..., tuple[NodeProcess, LifecycleDriver]]
+
+
+@pytest.fixture
+def node() -> Iterator[Node]:
+    with ros_session("test") as session_node:
+        yield session_node
+
+
+@pytest.fixture
+def start(node: Node, settings: RunSettings, tmp_path: Path) -> Iterator[Start]:
+    started: list[NodeProcess] = []
+
+    def start_one(which: int, **overrides: object) -> tuple[NodeProcess, LifecycleDriver]:
+        parameters = {"use_sim_time": False, "autostart": False, **overrides}
+        chosen = replace(settings, policy="rule_based", supervisor="off", overrides=parameters)
+        command = chosen.planner_commands()[which]
+        process = NodeProcess(command, tmp_path / f"{len(started)}.log")
+        started.append(process)
+        return process, LifecycleDriver(node, ("situation", "policy")[which], process.check)
+
+    yield start_one
+    for process in started:
+        process.interrupt()
+    for process in started:
+        process.stop()
+
+
+def end(process: NodeProcess, number: int) -> int:
+    os.kill(process.pid, number)
+    wait_until(lambda: process.exit_code is not None, "the end", END_S, lambda: None)
+    assert "Traceback" not in process.output(), process.output()
+    assert process.exit_code is not None
+    return process.exit_code
+
+
+@pytest.mark.parametrize("which", [SITUATION, POLICY], ids=["situation", "policy"])
+def test_a_node_goes_through_all_its_states_and_back(start: Start, which: int) -> None:
+    process, life = start(which)
+    seen = [life.state()]
+    for transition in ("configure", "activate", "deactivate", "cleanup", "configure", "activate"):
+        assert life.change(transition), process.output()
+        seen.append(life.state())
+    expected = ["unconfigured", "inactive", "active", "inactive", "unconfigured"]
+    assert seen == [*expected, "inactive", "active"]
+    assert life.change("shutdown")
+    wait_until(lambda: process.exit_code is not None, "the end", END_S, lambda: None)
+    assert process.exit_code == 0, process.output()
+
+
+@pytest.mark.parametrize("which", [SITUATION, POLICY], ids=["situation", "policy"])
+def test_a_transition_that_the_state_does_not_have_is_refused_and_harms_nobody(
+    start: Start, which: int
+) -> None:
+    process, life = start(which)
+    for transition in ("activate", "cleanup", "no_such_transition"):
+        assert not life.change(transition)
+    assert life.state() == "unconfigured"
+    assert "Traceback" not in process.output()
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=lambda s: s.name)
+@pytest.mark.parametrize("state", ["unconfigured", "configuring", "inactive", "active"])
+def test_a_node_that_is_asked_to_end_ends_without_an_error_in_every_state(
+    start: Start, state: str, number: signal.Signals
+) -> None:
+    process, life = start(POLICY, policy="tuned" if state == "configuring" else "rule_based")
+    if state == "configuring":
+        life.request("configure")
+    elif state != "unconfigured":
+        assert life.change("configure")
+    if state == "active":
+        assert life.change("activate")
+    life.await_state(state)
+    assert end(process, number) == 0, process.output()
+
+
+def test_a_managed_policy_decides_while_it_is_active_and_at_no_other_time(
+    node: Node, start: Start
+) -> None:
+    decisions: list[Decision] = []
+    node.create_subscription(Decision, topics.DECISION.name, decisions.append, topics.DECISION.qos)
+    process, life = start(POLICY)
+    assert life.change("configure")
+    assert decisions == []
+    assert life.change("activate")
+    wait_until(lambda: len(decisions) >= 3, "decisions", PATIENCE_S, process.check)
+    assert life.change("deactivate")
+    seen = len(decisions)
+    life.state()
+    assert len(decisions) <= seen + 1
+    assert {(d.action, d.reason) for d in decisions} == {(Decision.STOP, Decision.MISSING_INPUT)}
+
+
+def test_what_cannot_be_configured_stays_unconfigured_until_it_is_corrected(
+    start: Start, settings: RunSettings
+) -> None:
+    process, life = start(SITUATION, map_file="/no/such/map.osm")
+    assert not life.change("configure")
+    assert life.state() == "unconfigured"
+    lines = [line for line in process.output().splitlines() if "not configured: " in line]
+    assert len(lines) == 1
+    assert "/no/such/map.osm does not exist" in lines[0]
+    assert life.set("map_file", str(settings.map_file)) == "ok"
+    assert life.change("configure"), process.output()
+    assert life.state() == "inactive"
+
+
+def test_a_refused_policy_goes_on_saying_stop_until_another_one_is_configured(
+    node: Node, start: Start
+) -> None:
+    decisions: list[Decision] = []
+    node.create_subscription(Decision, topics.DECISION.name, decisions.append, topics.DECISION.qos)
+    process, life = start(POLICY, policy="no_such_policy", autostart=True)
+
+    def newest() -> int | None:
+        return decisions[-1].reason if decisions else None
+
+    wait_until(lambda: newest() == Decision.POLICY_REFUSED, "refusal", PATIENCE_S, process.check)
+    assert life.state() == "unconfigured"
+    assert life.set("policy", "rule_based") == "ok"
+    assert life.change("configure"), process.output()
+    assert life.change("activate")
+    wait_until(lambda: newest() == Decision.MISSING_INPUT, "MISSING", PATIENCE_S, process.check)
+    assert {decision.action for decision in decisions} == {Decision.STOP}
+
+
+def test_parameters_change_at_once_or_are_refused_with_the_reason(start: Start) -> None:
+    _, life = start(POLICY)
+    assert life.change("configure")
+    assert life.set("max_situation_age_s", 0.3) == "ok"
+    assert life.set("supervisor", "enforce") == "ok"
+    refusal = life.set("policy", "always_stop")
+    assert refusal.startswith("parameter policy may change while the node is unconfigured, but")
+    assert "inactive" in refusal
+    assert life.set("supervisor", "strict").startswith("supervisor is 'strict', expected one of")
+    assert "recovery_s" in life.set("recovery_s", 1e9)

@@ -90,7 +90,7 @@ def explain(
     decision = Decision(
         action=answer.action,
         target_speed_mps=target_speed(answer.action, config.risk.ego),
-        reason=answer.reason,
+        reason=_reason(answer.reason, explanation),
         text="",
         q_values=decisions.q_values[index].copy(),
         action_risks=decisions.action_risks[index].copy(),
@@ -103,6 +103,13 @@ def explain(
         proposed=answer.proposed,
     )
     return replace(decision, text=text_of(decision))
+
+
+def _reason(given: Reason, explanation: Explanation) -> Reason:
+    """Return the reason for whom the explanation names, seen or hidden."""
+    if given not in {Reason.VEHICLE, Reason.HIDDEN_VEHICLE}:
+        return given
+    return Reason.HIDDEN_VEHICLE if explanation.hidden else Reason.VEHICLE
 
 
 def fault_decision(

@@ -55,7 +55,7 @@ def weigh(
         return Weighed(known, whom)
     told = _about(whom, known, answer, s, by)
     if told.critical is Critical.AHEAD and answer.is_told_by_check and answer.lacking_s > 0.0:
-        told, whom = _behind_leader(known, answer, s, by) or (told, whom)
+        told, whom = _instead_of_leader(known, answer, s, by) or (told, whom)
     return Weighed(replace(told, verdict=_verdict(told, answer, by)), whom)
 
 
@@ -114,16 +114,23 @@ def _about(
     return replace(known, gap_wanted_s=gap_s, lacking_s=gap_s - (reach_s - leave_s))
 
 
-def _behind_leader(
+def _instead_of_leader(
     known: Explanation, answer: Answer, s: Situations, by: Yardstick
 ) -> Weighed | None:
-    """Tell of the leader that leaves the least room to stop; None without any.
+    """Tell of the leader that is tightest to stop behind, or of who comes first where all do.
 
     Going on for ever fails behind any leader, however far, so the check may name any of them.
+    None where there is none.
     """
     leader = tightest_leader(s, answer.considered, by)
     if leader is None:
         return None
+    if leader.lacking_s <= 0.0:
+        first = nearest(s, answer.considered, by)
+        if first.lane >= 0:
+            told = _about(first, known, answer, s, by)
+            if not told.lacking_s <= 0.0:
+                return Weighed(told, first)
     told = _about(leader.whom, known, answer, s, by)
     lacking_s = leader.lacking_s if leader.lacking_s > 0.0 else math.nan
     return Weighed(replace(told, lacking_s=lacking_s), leader.whom)

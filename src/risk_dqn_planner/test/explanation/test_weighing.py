@@ -52,6 +52,14 @@ def told(random_situations: Make) -> dict[str, list[tuple[Decision, Situations]]
     return found
 
 
+def has_leader(s: Situations) -> bool:
+    """Whether anybody has joined the ego's path: of such the check may name any."""
+    lane = s.vehicle_lane
+    joined = s.lane_merging[lane] & (s.vehicle_distance_m <= -0.5 * s.lane_zone_m[lane])
+    return bool((s.vehicle_mask & joined).any())
+
+
+SAME_LANE = (Critical.AHEAD, Critical.BEHIND)
 Told = dict[str, list[tuple[Decision, Situations]]]
 
 
@@ -77,6 +85,8 @@ def test_distance_and_speed_are_those_of_whom_it_names(told: Told, name: str) ->
         assert why.merging == s.lane_merging[lane]
         assert why.ego_distance_m == s.lane_ego_distance_m[lane]
         assert why.hidden is (decision.critical_vehicle_id is None)
+        assert (decision.reason is Reason.VEHICLE) <= (not why.hidden)
+        assert (decision.reason is Reason.HIDDEN_VEHICLE) <= why.hidden
         if why.hidden:
             assert why.distance_m == s.lane_hidden_distance_m[lane]
             assert why.speed_mps == s.lane_speed_limit_mps[lane]
@@ -89,13 +99,13 @@ def test_distance_and_speed_are_those_of_whom_it_names(told: Told, name: str) ->
 
 @pytest.mark.parametrize("name", POLICIES)
 def test_what_lacks_is_the_gap_wanted_less_the_gap_there_is(told: Told, name: str) -> None:
-    for decision, _ in told[name]:
+    for decision, s in told[name]:
         why = decision.explanation
         if not math.isnan(why.gap_wanted_s):
             gap_s = why.reach_s - why.leave_s
             assert why.lacking_s == pytest.approx(why.gap_wanted_s - gap_s)
         if why.verdict in {Verdict.TOO_LATE, Verdict.NO_WAY_OUT}:
-            assert why.lacking_s > 0.0 or why.critical in {Critical.AHEAD, Critical.BEHIND}
+            assert why.lacking_s > 0.0 or why.critical in SAME_LANE or has_leader(s)
         if why.verdict is Verdict.TOO_LATE:
             assert decision.action_risks[why.considered] > 0.0
 
@@ -103,10 +113,10 @@ def test_what_lacks_is_the_gap_wanted_less_the_gap_there_is(told: Told, name: st
 @pytest.mark.parametrize("name", CHECKED)
 def test_what_lacks_is_what_the_check_of_soundness_says(told: Told, name: str) -> None:
     forbidden = 0
-    for decision, _ in told[name]:
+    for decision, s in told[name]:
         why = decision.explanation
         assert not np.isnan(why.margins_s).any()
-        if why.verdict is Verdict.NO_WAY_OUT and why.critical is not Critical.AHEAD:
+        if why.verdict is Verdict.NO_WAY_OUT and not has_leader(s):
             assert why.considered is not None
             assert why.lacking_s == pytest.approx(-why.margins_s[why.considered])
             forbidden += 1
@@ -162,6 +172,20 @@ def test_of_leaders_the_one_is_named_that_leaves_the_least_room_to_stop(situatio
     assert (why.critical, why.considered) == (Critical.AHEAD, Action.FAST)
     assert why.ahead_m == pytest.approx(9.0)
     assert why.lacking_s == pytest.approx((6.0714 + 5.0 - 9.0625) / 5.0, abs=1e-3)
+
+
+def test_a_leader_far_ahead_is_not_blamed_for_what_a_hidden_place_forbids(situation: Make) -> None:
+    # 1 m before the merging zone at 5 m/s: too late to stop, and anybody may come 4 m up the lane.
+    lane = {"id": 12, "ego_m": 11.0, "ego_zone_m": 20.0, "zone_m": 20.0, "merging": True}
+    s = situation(
+        [lane | {"hidden_m": 14.0}], [{"id": 4, "lane": 12, "m": -30.0, "mps": 5.0}], ego_mps=5.0
+    )
+    policy = FastestSoundPolicy()
+    decision = explain(policy.decide(s, np.array([True])), s, 0, policy)
+    assert decision.explanation.verdict is Verdict.NO_WAY_OUT
+    assert decision.reason is Reason.HIDDEN_VEHICLE
+    assert (decision.critical_vehicle_id, decision.critical_lane_id) == (None, 12)
+    assert "lane 12 is hidden beyond 14.0 m, a vehicle there merges in 0.6 s" in decision.text
 
 
 @pytest.mark.parametrize("name", POLICIES)

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The managed nodes over their services: every state, what may change in it, and its end."""
 
+import hashlib
 import os
 import signal
 from collections.abc import Callable, Iterator
@@ -12,6 +13,7 @@ from intersection_msgs.msg import Decision
 from lifecycle_driver import LifecycleDriver
 from rclpy.node import Node
 
+from risk_dqn_planner.policies.shipped import shipped_policies
 from sim_bridge.ros import topics
 from sim_bridge.ros.process import NodeProcess
 from sim_bridge.ros.run_settings import RunSettings
@@ -147,6 +149,22 @@ def test_a_refused_policy_goes_on_saying_stop_until_another_one_is_configured(
     assert life.change("activate")
     wait_until(lambda: newest() == Decision.MISSING_INPUT, "MISSING", PATIENCE_S, process.check)
     assert {decision.action for decision in decisions} == {Decision.STOP}
+
+
+def test_a_policy_file_is_loaded_only_once_its_hash_is_trusted(
+    start: Start, tmp_path: Path
+) -> None:
+    # The planner's own file with a byte more: TorchScript still, but nobody's.
+    data = shipped_policies()["tuned"].path.read_bytes() + b"\0"
+    own = tmp_path / "own.pt"
+    own.write_bytes(data)
+    sha256 = hashlib.sha256(data).hexdigest()
+    process, life = start(POLICY, policy=str(own))
+    assert not life.change("configure")
+    assert f"own.pt has SHA-256 {sha256}, which no list" in process.output()
+    assert life.set("trusted_policies", sha256) == "ok"
+    life.change("configure")
+    assert process.output().count("which no list") == 1
 
 
 def test_parameters_change_at_once_or_are_refused_with_the_reason(start: Start) -> None:

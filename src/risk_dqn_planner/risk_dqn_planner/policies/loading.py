@@ -13,6 +13,7 @@ from risk_dqn_planner.policies.fastest_sound import FastestSoundPolicy, assumpti
 from risk_dqn_planner.policies.look_ahead import LookAheadPolicy
 from risk_dqn_planner.policies.rule_based import RuleBasedConfig, RuleBasedPolicy
 from risk_dqn_planner.policies.shipped import ShippedPolicy, shipped_policies
+from risk_dqn_planner.policies.trust import ANYTHING, Trust
 from risk_dqn_planner.safety.assumptions import SafetyAssumptions
 from risk_dqn_planner.state.encoding import StateConfig
 
@@ -39,6 +40,7 @@ def load_policy(
     config: RuleBasedConfig | None = None,
     state: StateConfig | None = None,
     assumptions: SafetyAssumptions | None = None,
+    trust: Trust = ANYTHING,
 ) -> Policy:
     """Return a policy that stops at the goal.
 
@@ -47,7 +49,8 @@ def load_policy(
     and returns a Policy. config: prediction of Algorithm 1, for the rule itself and for the
     risks shown with any decision. state: what a policy file must have been trained on, by
     default StateConfig(). assumptions: what a trained policy rests on that is told which actions
-    are sound, by default those that follow from `config`.
+    are sound, by default those that follow from `config`. trust: which policy files may be
+    loaded; by default the one that is named, whatever it is.
     Raises UnknownPolicyError for a name that is none of these, PolicyFileError for a file that
     cannot be used, PolicyError for a factory that fails.
     """
@@ -57,7 +60,7 @@ def load_policy(
     if name in BUILT_IN:
         policy = BUILT_IN[name](config)
     elif name.endswith(".pt"):
-        policy = _from_file(Path(name), config, state, assumptions)
+        policy = _from_file(Path(name), config, state, assumptions, trust=trust)
     elif ":" in name:
         policy = _from_factory(name, config)
     else:
@@ -90,6 +93,7 @@ def _from_file(
     state: StateConfig,
     assumptions: SafetyAssumptions,
     shipped: ShippedPolicy | None = None,
+    trust: Trust = ANYTHING,
 ) -> Policy:
     # Torch takes seconds to load and is not needed unless a network is asked for.
     from risk_dqn_planner.policies.learned import LearnedPolicy  # noqa: PLC0415
@@ -102,7 +106,8 @@ def _from_file(
     expected = PolicyContract(
         name="", state=state, ego=config.risk.ego, decision_period_s=config.decision_period_s
     )
-    file = load_policy_file(path, expected, None if shipped is None else shipped.sha256)
+    sha256 = None if shipped is None else shipped.sha256
+    file = load_policy_file(path, expected, sha256, trust)
     name = file.name if shipped is None else shipped.name
     if file.outlook is None:
         return LearnedPolicy(file.module, name, file.sha256, state, config)

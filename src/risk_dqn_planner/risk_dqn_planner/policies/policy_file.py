@@ -25,6 +25,7 @@ from risk_dqn_planner.errors import ConfigurationError, PolicyFileError
 from risk_dqn_planner.policies.base import Action
 from risk_dqn_planner.policies.outlook import LAYOUT as OUTLOOK_LAYOUT
 from risk_dqn_planner.policies.outlook import OutlookConfig
+from risk_dqn_planner.policies.trust import ANYTHING, Trust
 from risk_dqn_planner.state.encoding import COLUMNS, LAYOUT, ROWS, SCENES, StateConfig
 from risk_dqn_planner.vehicle import EgoLimits
 
@@ -103,14 +104,18 @@ def save_policy(path: Path | str, network: torch.nn.Module, contract: PolicyCont
 
 
 def load_policy_file(
-    path: Path | str, expected: PolicyContract | None = None, sha256: str | None = None
+    path: Path | str,
+    expected: PolicyContract | None = None,
+    sha256: str | None = None,
+    trust: Trust = ANYTHING,
 ) -> PolicyFile:
     """Read a policy file and check it against what is expected here (by default: the defaults).
 
-    sha256: of the file, where it is known; any other file is refused unread.
-    Raises PolicyFileError if the file is missing, is another one, is no TorchScript, has no
-    contract, was trained for another state, other actions or another rate, or does not compute
-    what it did.
+    sha256: of the file, where it is known; any other file is refused unread. trust: in which
+    files, since reading one runs its code; any other is refused unread, too.
+    Raises PolicyFileError if the file is missing, is another one, is not trusted, is no
+    TorchScript, has no contract, was trained for another state, other actions or another rate, or
+    does not compute what it did.
     """
     try:
         data = Path(path).read_bytes()
@@ -119,6 +124,7 @@ def load_policy_file(
     found = hashlib.sha256(data).hexdigest()
     if found != (sha256 or found):
         raise PolicyFileError(f"policy file {path} has SHA-256 {found}, expected {sha256}")
+    trust.check(path, found)
     files = {CONTRACT: ""}
     try:
         module = _deserialise(data, files)

@@ -9,6 +9,7 @@ from risk_dqn_planner.policies.loading import load_policy
 from risk_dqn_planner.policies.look_ahead import LookAheadPolicy
 from risk_dqn_planner.policies.rule_based import RuleBasedConfig
 from risk_dqn_planner.policies.supervised import Supervisor, SupervisorMode
+from risk_dqn_planner.policies.trust import ANYTHING, Trust
 from risk_dqn_planner.risk.config import RiskConfig
 from risk_dqn_planner.safety.assumptions import SafetyAssumptions
 
@@ -36,12 +37,16 @@ def config_of(assumptions: SafetyAssumptions) -> RuleBasedConfig:
 
 
 def load_supervised(
-    name: str, mode: SupervisorMode, assumptions: SafetyAssumptions | None = None
+    name: str,
+    mode: SupervisorMode,
+    assumptions: SafetyAssumptions | None = None,
+    trust: Trust = ANYTHING,
 ) -> Policy:
     """Return a policy as `load_policy` does, with a supervisor around it unless that is off.
 
     assumptions: what the supervisor's checks rest on; their vehicles are the policy's as well.
-    Policies that are sound themselves rest on them and get no supervisor.
+    Policies that are sound themselves rest on them and get no supervisor. trust: as in
+    `load_policy`.
 
     Raises:
         PolicyError: as `load_policy`; also for a trained policy whose target speeds are others.
@@ -49,7 +54,7 @@ def load_supervised(
     assumptions = assumptions or SafetyAssumptions()
     if name in SOUND:
         return StopsAtGoal(SOUND[name](assumptions))
-    policy = load_policy(name, config_of(assumptions), assumptions=assumptions)
+    policy = load_policy(name, config_of(assumptions), assumptions=assumptions, trust=trust)
     if mode is SupervisorMode.OFF or is_sound(policy):
         return policy
     return Supervisor(policy, mode, assumptions)

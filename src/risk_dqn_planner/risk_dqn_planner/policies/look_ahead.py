@@ -57,24 +57,55 @@ class LookAheadConfig:
                   "a longer gap than at full speed",
                   "minimum": 0.0, "maximum": 100.0},
     )  # fmt: skip
+    chance_price_s: float = field(
+        default=3.0,
+        metadata={"description": "Time expected to be lost at each place where the ego may yet "
+                  "have to wait [s]",
+                  "minimum": 0.0, "maximum": 60.0},
+    )  # fmt: skip
+    haste: float = field(
+        default=0.5,
+        metadata={"description": "Time expected to be lost for each second before such a place, as "
+                  "gaps close that are not taken",
+                  "minimum": 0.0, "maximum": 10.0},
+    )  # fmt: skip
+    creeping_price_s_per_m: float = field(
+        default=20.0,
+        metadata={"description": "Time expected to be lost for each metre by which the ego comes "
+                  "to rest short of a line behind which a corner hides a lane [s/m]",
+                  "minimum": 0.0, "maximum": 1000.0},
+    )  # fmt: skip
+    fine_cells: int = field(
+        default=10,
+        metadata={"description": "Where decimetres decide what is seen, cells are shorter by this",
+                  "minimum": 1, "maximum": 100},
+    )  # fmt: skip
     nearest_corner_m: float = field(
-        default=2.5,
+        default=2.0,
         metadata={"description": "What hides a lane ends at least this far before its centreline "
                   "[m]",
                   "minimum": 0.0, "maximum": 20.0},
     )  # fmt: skip
 
     def __post_init__(self) -> None:
-        if self.decisions < 1:
-            raise ConfigurationError(
-                f"LookAheadConfig.decisions is {self.decisions}, expected 1 or more"
-            )
+        for name in ("decisions", "fine_cells"):
+            if getattr(self, name) < 1:
+                raise ConfigurationError(
+                    f"LookAheadConfig.{name} is {getattr(self, name)}, expected 1 or more"
+                )
         for name in ("cell_m", "cell_mps"):
             if not getattr(self, name) > 0.0:
                 raise ConfigurationError(
                     f"LookAheadConfig.{name} is {getattr(self, name)}, expected a number above 0"
                 )
-        for name in ("switching_price_s", "gap_price", "nearest_corner_m"):
+        for name in (
+            "switching_price_s",
+            "gap_price",
+            "chance_price_s",
+            "haste",
+            "creeping_price_s_per_m",
+            "nearest_corner_m",
+        ):
             if not getattr(self, name) >= 0.0:
                 raise ConfigurationError(
                     f"LookAheadConfig.{name} is {getattr(self, name)}, expected 0 or more"
@@ -88,6 +119,10 @@ class LookAheadConfig:
             self.cell_mps,
             self.switching_price_s,
             self.gap_price,
+            self.chance_price_s,
+            self.haste,
+            self.creeping_price_s_per_m,
+            self.fine_cells,
         )
 
 

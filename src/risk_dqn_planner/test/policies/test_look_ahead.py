@@ -62,6 +62,29 @@ def test_it_drives_nearer_where_it_cannot_see_far_enough(situation: Make) -> Non
     assert first_action(situation(hidden, goal_m=30.0)) == Action.FAST
 
 
+@pytest.mark.parametrize("left_m", [0.56, 0.84])
+def test_it_creeps_on_where_a_hop_still_fits_before_the_line(
+    situation: Make, left_m: float
+) -> None:
+    # The shortest hop takes 0.27 m; from nearer by the ego sees more of what is hidden.
+    lanes = [
+        {"id": 3, "ego_m": left_m + 3.1, "hidden_m": 24.0},
+        {"id": 4, "ego_m": left_m + 6.6, "hidden_m": 24.0},
+    ]
+    assert first_action(situation(lanes, goal_m=30.0)) > Action.STOP
+
+
+def test_it_joins_a_queue_rather_than_wait_for_it_to_move(situation: Make) -> None:
+    # The queue in the lane stands; behind the join nobody comes for a while.
+    lane = {"id": 3, "ego_m": 3.2, "merging": True, "hidden_m": 70.0}
+    standing = {"id": 7, "lane": 3, "m": -12.0, "mps": 0.0}
+    coming = {"id": 8, "lane": 3, "m": 50.0, "mps": 6.0}
+    s = situation([lane], [standing, coming], goal_m=30.0)
+    hesitant = LookAheadPolicy(config=LookAheadConfig(chance_price_s=0.0, haste=0.0))
+    assert hesitant.decide(s, NEW).action[0] == Action.STOP
+    assert first_action(s) > Action.STOP
+
+
 @settings(max_examples=30, deadline=None)
 @given(seed=st.integers(0, 2**31), delay_s=st.sampled_from([0.0, 0.2]))
 def test_it_never_takes_an_action_that_is_not_sound(
@@ -109,7 +132,7 @@ def test_it_is_known_by_name_and_its_hash_by_its_configuration() -> None:
     assert policy.hash != FastestSoundPolicy().hash
 
 
-@pytest.mark.parametrize("name", ["decisions", "cell_m", "cell_mps"])
+@pytest.mark.parametrize("name", ["decisions", "fine_cells", "cell_m", "cell_mps"])
 def test_a_configuration_that_makes_no_sense_is_refused(name: str) -> None:
     with pytest.raises(ConfigurationError, match=f"LookAheadConfig.{name} is 0"):
         LookAheadConfig(**{name: 0})

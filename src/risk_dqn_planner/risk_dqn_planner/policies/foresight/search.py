@@ -20,9 +20,11 @@ from risk_dqn_planner.policies.foresight.task import (
     Work,
 )
 from risk_dqn_planner.policies.foresight.waiting import (
+    decimetres_matter,
     find_places,
     free_way,
     nothing_to_decide,
+    places_ahead,
     waiting_price,
 )
 from risk_dqn_planner.risk.motion import time_to_cover
@@ -76,8 +78,9 @@ def search(t: Task, w: Work) -> None:
     places = find_places(t, w.places)
     if allowed == 1:
         return
-    if w.best.action[0] == _FAST and nothing_to_decide(t, free_m, w.places, places):
+    if w.best.action[0] == _FAST and nothing_to_decide(t, free_m, w.places, places, w.shortfall_m):
         return
+    fine = t.c.fine if decimetres_matter(t, w.places, places) else 1
     w.cells.stamp[:] = NOTHING
     nodes = w.nodes
     nodes.way_m[0, 0], nodes.cost_s[0, 0] = 0.0, 0.0
@@ -86,22 +89,33 @@ def search(t: Task, w: Work) -> None:
     count = 1
     for k in range(t.c.decisions):
         last_m, merging = predict(t, k, w)
-        count = follow(t, k, count, free_m, last_m, merging, w)
+        count = follow(t, k, count, free_m, last_m, merging, fine, places, w)
     side = t.c.decisions % 2
     for i in range(count):
         way_m, mps = nodes.way_m[side, i], nodes.speed_mps[side, i]
         total_s = nodes.cost_s[side, i] + t.c.decisions * t.p.period_s
         total_s += rest_of_time(t.s.goal_distance_m[t.row] - way_m, mps, t.p)
         if total_s < w.best.total_s[0]:
-            total_s += waiting_price(t, way_m, mps, w.places, places)
+            total_s += waiting_price(t, way_m, mps, w.places, places, w.shortfall_m)
             offer(total_s, nodes.first[side, i], w.best)
 
 
 @kernel
 def follow(
-    t: Task, k: int, count: int, free_m: float, last_m: float, merging: bool, w: Work
+    t: Task,
+    k: int,
+    count: int,
+    free_m: float,
+    last_m: float,
+    merging: bool,
+    fine: int,
+    places: int,
+    w: Work,
 ) -> int:
-    """Follow the states of decision k by each sound action; return how many states that makes."""
+    """Follow the states of decision k by each sound action; return how many states that makes.
+
+    fine: by how much cells are finer than usual; places: how many there are to wait at.
+    """
     p, side, more, goal_m = t.p, k % 2, 0, t.s.goal_distance_m[t.row]
     for i in range(count):
         way_m, mps = w.nodes.way_m[side, i], w.nodes.speed_mps[side, i]
@@ -137,8 +151,10 @@ def follow(
                 offer(cost_s + goal_s, first, w.best)
             else:
                 step_mps = speed_at(course, p.period_s, p)
+                waits = places_ahead(way_m + step_m, w.places, places)
+                cost_s += waits * t.c.haste * p.period_s
                 node = Node(way_m + step_m, step_mps, cost_s, first, action)
-                more = put(node, k, more, t.c, p, w.nodes, w.cells)
+                more = put(node, k, more, t.c, fine, p, w.nodes, w.cells)
     return more
 
 
@@ -175,7 +191,14 @@ def offer(total_s: float, first: int, best: Best) -> None:
 
 @kernel
 def put(
-    node: Node, k: int, count: int, c: SearchNumbers, p: SafetyNumbers, nodes: Nodes, cells: Cells
+    node: Node,
+    k: int,
+    count: int,
+    c: SearchNumbers,
+    fine: int,
+    p: SafetyNumbers,
+    nodes: Nodes,
+    cells: Cells,
 ) -> int:
     """Add a state that follows decision k, or let it replace a dearer one in its cell.
 
@@ -183,7 +206,7 @@ def put(
     """
     speeds = int(p.fast_mps / c.cell_mps) + 2
     column = min(int(node.speed_mps / c.cell_mps + 0.5), speeds - 1)
-    cell = min(int(node.way_m / c.cell_m) * speeds + column, len(cells.stamp) - 1)
+    cell = min(int(node.way_m * fine / c.cell_m) * speeds + column, len(cells.stamp) - 1)
     side, i = (k + 1) % 2, count
     if cells.stamp[cell] == k:
         i = cells.node[cell]

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from risk_dqn_planner.policies.foresight.creeping import shortfalls
 from risk_dqn_planner.safety.assumptions import SafetyNumbers
 from risk_dqn_planner.situation.situations import (
     Booleans,
@@ -24,6 +25,10 @@ class SearchNumbers(NamedTuple):
     cell_mps: float
     switching_s: float
     gap_price: float
+    chance_s: float = 0.0
+    haste: float = 0.0
+    creeping_s_per_m: float = 0.0
+    fine: int = 1
 
 
 class Task(NamedTuple):
@@ -113,6 +118,7 @@ class Work(NamedTuple):
     of_vehicles_s: Floats
     nearest: Integers
     places: Places
+    shortfall_m: Floats
     nodes: Nodes
     cells: Cells
     best: Best
@@ -121,8 +127,9 @@ class Work(NamedTuple):
 def work_for(c: SearchNumbers, p: SafetyNumbers, vehicles: int, lanes: int) -> Work:
     """Return room to search situations of N vehicles and M lanes."""
     furthest_m = c.decisions * p.period_s * p.fast_mps
-    # Egos that are faster than Fast at first share the last cells.
+    # Egos that are faster than Fast at first share the last cells. Fine cells reach less far.
     cells = (math.ceil(furthest_m / c.cell_m) + 1) * (int(p.fast_mps / c.cell_mps) + 2)
+    cells *= c.fine
     return Work(
         ahead=empty_situations(c.decisions, vehicles, lanes),
         reacted_m=np.empty((c.decisions, lanes)),
@@ -131,6 +138,7 @@ def work_for(c: SearchNumbers, p: SafetyNumbers, vehicles: int, lanes: int) -> W
         of_vehicles_s=np.empty(lanes),
         nearest=np.empty(lanes, dtype=np.int64),
         places=Places(np.empty(lanes), np.empty(lanes), np.empty(lanes, dtype=np.bool_)),
+        shortfall_m=shortfalls(p),
         nodes=Nodes(
             way_m=np.empty((2, cells)),
             speed_mps=np.empty((2, cells)),

@@ -36,7 +36,7 @@ TUNED := --preset tuned --reward collision --steps 3000000 --name tuned \
   --map four_way,t_junction,multi_lane,roundabout \
   --scenario base,dense_traffic,severe_occlusion,close_small_obstacle
 
-.PHONY: help setup demo test replay bags convert maps train trainings evaluate ship bench shell format lint types check clean distclean
+.PHONY: help setup demo test replay bags convert maps train trainings evaluate ship bench soak timing shell format lint types check clean distclean
 
 help: ## list the targets
 	@echo 'make TARGET, where TARGET is one of'
@@ -99,6 +99,14 @@ story: ## tell when and why decisions changed: BAG=bags/... [TOPIC PICTURE=story
 	@$(if $(BAG),,echo 'error: say which bag, for example make story BAG=bags/four_way' >&2; exit 2)
 	@$(WITH_ROS) $(SIMULATION)/story '$(BAG)' $(call option,--topic,TOPIC) \
 	  $(call option,--picture,PICTURE) $(ARGS)
+
+soak: ## drive for an hour of simulated time and watch memory and decisions [HOURS=1 MAP POLICY SCENARIO OUT]
+	@$(WITH_ROS) $(SIMULATION)/soak $(call option,--hours,HOURS) $(RUN_OPTIONS) $(ARGS)
+
+timing: ## measure the nodes, soak them for an hour, and write docs/timing.md
+	@$(WITH_ROS) bash -c 'python -m bench --sections nodes --out out/timing/bench.json && \
+	  $(SIMULATION)/soak --out out/timing && \
+	  python -m bench.nodes.page out/timing/bench.json out/timing/soak.json docs/timing.md'
 
 shell: ## open a shell in which the nodes run [ARGS="-c 'command'"]
 	@$(WITH_ROS) bash --rcfile tools/shell.bashrc $(ARGS)

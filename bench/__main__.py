@@ -22,6 +22,7 @@ SECTIONS = {
     "simulator": "bench.simulators",
     "updates": "bench.updates",
     "latency": "bench.latency",
+    "nodes": "bench.nodes.section",
     "training": "bench.training",
 }
 INTERRUPTED = 130

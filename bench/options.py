@@ -11,6 +11,7 @@ class Effort:
     peer_s: processor time of a peer's turn. paper_steps: of the preset `paper`, from which the
     whole run is extrapolated. seeds: trainings of ours whose median counts. sb3_limit_s: when
     stable-baselines3 is stopped, None for ten times ours and a margin; ours_limit_s: when ours is.
+    drive_s: of traffic played to the nodes in real time. node_decisions: asked of the policy node.
     """
 
     rounds: int = 5
@@ -22,6 +23,8 @@ class Effort:
     decisions: int = 3_000
     situations: int = 400
     ours_limit_s: float = 120.0
+    drive_s: float = 100.0
+    node_decisions: int = 400
 
 
 QUICK = Effort(
@@ -34,4 +37,6 @@ QUICK = Effort(
     decisions=200,
     situations=20,
     ours_limit_s=3.0,
+    drive_s=5.0,
+    node_decisions=40,
 )

@@ -50,6 +50,7 @@ setup(
             "record = sim_bridge.ros.record:main",
             "replay = sim_bridge.ros.replay:main",
             "ship = sim_bridge.learning.ship:main",
+            "soak = sim_bridge.ros.soak.command:main",
             "simulator_node = sim_bridge.ros.simulator_node:main",
             "story = sim_bridge.ros.story.command:main",
             "train = sim_bridge.learning.train:main",

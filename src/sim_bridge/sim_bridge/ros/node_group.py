@@ -37,6 +37,10 @@ class NodeGroup:
     ) -> None:
         self.stop()
 
+    def pids(self) -> dict[str, int]:
+        """Process ids by the names of the executables."""
+        return {process.name: process.pid for process in self._processes}
+
     def check(self) -> None:
         """Raise NodeDiedError if one of the nodes has ended."""
         for process in self._processes:

@@ -193,12 +193,15 @@ class Decider:
         self._trouble = self._untold = trouble
         self._troubled_ns = now_ns
 
-    def decide(self, now_ns: int, steady_ns: int = 0) -> Choice:
-        """Return the decision at a time on the clock of the stamps [ns]."""
+    def decide(self, now_ns: int, steady_ns: int = 0, trouble: Trouble | None = None) -> Choice:
+        """Return the decision at a time on the clock of the stamps [ns].
+
+        trouble: what else speaks against asking the policy now.
+        """
         policy, report = self.policy, self._report
         if isinstance(policy, UnusablePolicy):
             return self._stop(Trouble(policy.reason, policy.source, policy.fault))
-        present = self._present(now_ns, steady_ns)
+        present = trouble or self._present(now_ns, steady_ns)
         if present is not None:
             self.doubt(present, now_ns)
         told = present or self._untold or self._recovering(now_ns)

@@ -160,14 +160,17 @@ class PolicyNode(ManagedNode):
         reason, text = Reason.FROZEN_INPUT, f"the clock has stood still for {stood_s:.1f} s"
         if stamp_ns == 0:
             reason, text = Reason.MISSING_INPUT, "no time received on /clock yet"
-        self._decider.doubt(Trouble(reason, FaultyInput.CLOCK, text), stamp_ns)
-        self.decide(stamp_ns)
+        self._decide(stamp_ns, Trouble(reason, FaultyInput.CLOCK, text))
 
     def decide(self, stamp_ns: int) -> None:
-        """Take the decision of a time, whatever it takes."""
+        """Take the decision of a time."""
+        self._decide(stamp_ns)
+
+    def _decide(self, stamp_ns: int, trouble: Trouble | None = None) -> None:
+        """Take a decision, whatever happens."""
         decider = self._decider
         try:
-            choice = decider.decide(stamp_ns, time.monotonic_ns())
+            choice = decider.decide(stamp_ns, time.monotonic_ns(), trouble)
         except Exception as error:  # noqa: BLE001 (a vehicle stops, whatever fails)
             self.get_logger().error(traceback.format_exc(), throttle_duration_sec=10.0)
             decider.forget()

@@ -338,6 +338,15 @@ def test_trouble_from_elsewhere_is_told_of_once_and_recovered_from() -> None:
     assert actions(node, report(1000), report(1500)) == [Reason.RECOVERING, Reason.CLEAR]
 
 
+def test_a_clock_that_stands_comes_before_what_the_situation_lacks() -> None:
+    trouble = Trouble(Reason.FROZEN_INPUT, FaultyInput.CLOCK, "the clock stands")
+    choice = decider(Recorder()).decide(0, 0, trouble)
+    assert (reason(choice), choice.decision.faulty_input) == (
+        Reason.FROZEN_INPUT,
+        FaultyInput.CLOCK,
+    )
+
+
 def test_limits_may_change_while_it_decides() -> None:
     node = decider(Recorder())
     decide_at(node, 0, report(0))

@@ -26,7 +26,13 @@ from sim_bridge.evaluation.contestants import DEFAULT_POLICIES, contestants, nam
 from sim_bridge.evaluation.progress import progress_on
 from sim_bridge.evaluation.rollout import Contestant
 from sim_bridge.evaluation.soundness.cells import MAPS, POLICIES
-from sim_bridge.evaluation.soundness.evaluate import EPISODES, LIMIT_EPISODES, Plan, run
+from sim_bridge.evaluation.soundness.evaluate import (
+    EPISODES,
+    LIMIT_EPISODES,
+    SEARCH_EPISODES,
+    Plan,
+    run,
+)
 from sim_bridge.evaluation.store import Store, write_whole
 from sim_bridge.evaluation.training_runs import RUN_FOLDERS, named_runs, training_runs
 from sim_bridge.maps import map_names
@@ -45,6 +51,12 @@ def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
     add("--set", choices=SETS, default=PAPER, help="which cells [%(default)s]")
     defaults = f"{PAPER_EPISODES}; {SOUNDNESS} {EPISODES}"
     add("--episodes", type=int, help=f"in each cell [{defaults}]")
+    add(
+        "--search-episodes",
+        type=int,
+        default=SEARCH_EPISODES,
+        help=f"of them, those that look_ahead drives ({SOUNDNESS}) [%(default)s]",
+    )
     add(
         "--limit-episodes",
         type=int,
@@ -188,7 +200,8 @@ def _soundness(arguments: argparse.Namespace, console: Console) -> None:
         )
     }
     episodes = EPISODES if arguments.episodes is None else arguments.episodes
-    plan = Plan(arguments.output, episodes, arguments.limit_episodes, **chosen)
+    searched = arguments.search_episodes
+    plan = Plan(arguments.output, episodes, searched, arguments.limit_episodes, **chosen)
     head, lines = run(plan, console)
     _write(arguments.output, head, lines)
     # Matplotlib takes a second to load, too long for --help.

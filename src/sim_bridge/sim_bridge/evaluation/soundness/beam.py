@@ -50,7 +50,7 @@ class BeamConfig:
     """How much is followed. cell_m, cell_mps: what counts as the same place and speed."""
 
     width: int = 64
-    cell_m: float = 0.1
+    cell_m: float = 0.02
     cell_mps: float = 0.05
 
     def __post_init__(self) -> None:

@@ -12,6 +12,8 @@ from sim_bridge.scenarios.loading import load_scenario, scenario_names
 FASTEST_SOUND, LOOK_AHEAD, RULE_BASED = "fastest_sound", "look_ahead", "rule_based"
 TUNED, SUPERVISED = "tuned", "tuned+supervisor"
 POLICIES = (FASTEST_SOUND, LOOK_AHEAD, SUPERVISED, TUNED, RULE_BASED)
+# Those that search at each decision, and so take a hundred times as long.
+SEARCHING = (LOOK_AHEAD,)
 # Those whose every action is sound where the assumptions hold.
 SOUND = (FASTEST_SOUND, LOOK_AHEAD, SUPERVISED)
 
@@ -96,7 +98,7 @@ def _memory() -> Iterator[SoundnessCell]:
 
 def _frontier() -> Iterator[SoundnessCell]:
     """Where the worst case forbids most; a hidden vehicle that is slower than the truth is risk."""
-    policies = (FASTEST_SOUND, SUPERVISED)
+    policies = (FASTEST_SOUND, LOOK_AHEAD, SUPERVISED)
     for after_s in BRAKES_AFTER_S:
         cell = Cell(OCCLUDED, RESPAWNING, sensor_forward_m=0.0, brakes_for_ego_after_s=after_s)
         for top_mps in HIDDEN_TOP_MPS:

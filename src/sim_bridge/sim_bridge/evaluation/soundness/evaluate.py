@@ -15,6 +15,7 @@ from sim_bridge.evaluation.campaign import Campaign, Places, versions
 from sim_bridge.evaluation.progress import progress_on
 from sim_bridge.evaluation.rollout import Clairvoyant, Contestant
 from sim_bridge.evaluation.soundness.cells import (
+    SEARCHING,
     SoundnessCell,
     missing_scenarios,
     soundness_cells,
@@ -25,27 +26,31 @@ from sim_bridge.evaluation.soundness.timeouts import SUCCESS, classified, united
 from sim_bridge.evaluation.statistics import wilson
 from sim_bridge.evaluation.store import Store
 
-EPISODES, LIMIT_EPISODES = 100_000, 300
+EPISODES, SEARCH_EPISODES, LIMIT_EPISODES = 100_000, 2000, 300
 
 Line = dict[str, Any]
 
 
 @dataclass(frozen=True)
 class Plan:
-    """How much of the set is driven. limit_episodes: the first ones, for the limits.
+    """How much of the set is driven.
+
+    search_episodes: the first ones, for policies that search at each decision; limit_episodes:
+    the first ones of those, for the limits.
 
     maps, scenarios, policies: only these; empty for all. output: folder of finished cells.
     """
 
     output: Path
     episodes: int = EPISODES
+    search_episodes: int = SEARCH_EPISODES
     limit_episodes: int = LIMIT_EPISODES
     maps: tuple[str, ...] = ()
     scenarios: tuple[str, ...] = ()
     policies: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        for name in ("episodes", "limit_episodes"):
+        for name in ("episodes", "search_episodes", "limit_episodes"):
             if getattr(self, name) < 1:
                 raise ConfigurationError(f"{name} is {getattr(self, name)}, expected 1 or more")
 
@@ -64,6 +69,15 @@ class Plan:
         if not any(cell.policies for cell in chosen):
             raise ConfigurationError("no cell of the set is left by maps, scenarios and policies")
         return chosen
+
+    def episodes_of(self, policy: str) -> int:
+        """Return how many episodes of each cell a policy drives."""
+        return min(self.episodes, self.search_episodes) if policy in SEARCHING else self.episodes
+
+    @property
+    def limited(self) -> int:
+        """Return of how many episodes the limits are searched, which everybody drives."""
+        return min(self.limit_episodes, self.search_episodes, self.episodes)
 
     def _takes(self, policy: str) -> bool:
         return not self.policies or policy in self.policies
@@ -84,9 +98,8 @@ class _Work:
             self.places[map_name] = Places(
                 lambda reach_m: load_place(map_name, sensor_range_m=reach_m)
             )
-        first = min(self.plan.limit_episodes, self.plan.episodes)
         store = Store(self.plan.output / "cells")
-        return Campaign(self.places[map_name], episodes, store, first)
+        return Campaign(self.places[map_name], episodes, store, self.plan.limited)
 
 
 def run(plan: Plan, console: Console) -> tuple[dict[str, Any], list[Line]]:
@@ -97,13 +110,14 @@ def run(plan: Plan, console: Console) -> tuple[dict[str, Any], list[Line]]:
     """
     work, lines = _Work(plan), []
     cells = _with_known_policies(plan.cells(), work.drivers, console)
-    limited = min(plan.limit_episodes, plan.episodes)
-    total = sum(len(c.policies) * plan.episodes + 2 * c.limits * limited for c in cells)
+    total = sum(
+        sum(map(plan.episodes_of, cell.policies)) + 2 * cell.limits * plan.limited for cell in cells
+    )
     with progress_on(console) as progress:
         task = progress.add_task("", total=total)
         for cell in cells:
             own = []
-            for driver, episodes in _who(cell, work, limited):
+            for driver, episodes in _who(cell, work):
                 where = f"{cell.map_name} {cell.cell.scenario}"
                 progress.update(task, description=f"{driver.name} {where}")
                 campaign = work.campaign(cell.map_name, episodes)
@@ -146,8 +160,9 @@ def _is_known(name: str, drivers: Drivers, console: Console) -> bool:
     return True
 
 
-def _who(cell: SoundnessCell, work: _Work, limited: int) -> list[tuple[Contestant, int]]:
+def _who(cell: SoundnessCell, work: _Work) -> list[tuple[Contestant, int]]:
     """Return who drives in a cell, and how many episodes."""
+    plan, limited = work.plan, work.plan.limited
     found: list[tuple[Contestant, int]] = []
     if cell.limits:
         place = work.campaign(cell.map_name, limited).places.of(cell.cell.load())
@@ -155,8 +170,9 @@ def _who(cell: SoundnessCell, work: _Work, limited: int) -> list[tuple[Contestan
             (PhysicalLimit(place, work.clairvoyant), limited),
             (SoundLimit(place, cell.assumptions), limited),
         ]
-    policies = (work.drivers.of(name, cell.assumptions) for name in cell.policies)
-    return found + [(driver, work.plan.episodes) for driver in policies]
+    return found + [
+        (work.drivers.of(name, cell.assumptions), plan.episodes_of(name)) for name in cell.policies
+    ]
 
 
 def _described(line: Line, cell: SoundnessCell) -> Line:

@@ -7,6 +7,7 @@ import pytest
 
 from sim_bridge.evaluation import campaign, evaluate
 from sim_bridge.evaluation.soundness.beam import BeamConfig
+from sim_bridge.evaluation.soundness.evaluate import Plan
 from sim_bridge.evaluation.soundness.reporting.tables import outcome
 
 OPTIONS = [
@@ -83,3 +84,12 @@ def test_a_choice_that_leaves_nothing_is_said(
     more = ["--output", str(tmp_path), "--scenarios", "nowhere"]
     assert evaluate.main(["--set", "soundness", *more]) == 2
     assert "no cell of the set is left" in capsys.readouterr().err
+
+
+def test_policies_that_search_drive_fewer_episodes_but_all_whose_limits_are_searched() -> None:
+    plan = Plan(Path("out"), episodes=100_000, search_episodes=2000, limit_episodes=300)
+    assert plan.episodes_of("fastest_sound") == 100_000
+    assert plan.episodes_of("look_ahead") == 2000
+    assert plan.limited == 300
+    small = Plan(Path("out"), episodes=50, search_episodes=20, limit_episodes=300)
+    assert (small.episodes_of("look_ahead"), small.limited) == (20, 20)

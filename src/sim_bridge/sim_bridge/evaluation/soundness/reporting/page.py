@@ -40,10 +40,11 @@ _INTRODUCTION = """\
 <!-- Written by `make evaluate SET=soundness REPORT=docs/soundness.md`; do not edit. -->
 
 [safety.md](safety.md) argues why an ego that follows the joint check cannot collide in a world that
-keeps its assumptions. This page looks for the opposite, and says what the promise costs: {episodes}
-episodes in each cell, the same ones for every policy, none of them seen in training. Brackets hold
-95% intervals. *Centre* and *front* say where the sensor is on the ego; where speeds are perceived
-with noise the check allows for errors of 4 standard deviations.
+keeps its assumptions. This page looks for the opposite, and says what the promise costs: up to
+{episodes} episodes in each cell, the same ones for every policy, none of them seen in training;
+policies that search at each decision drive the first ones only. Brackets hold 95% intervals.
+*Centre* and *front* say where the sensor is on the ego; where speeds are perceived with noise the
+check allows for errors of 4 standard deviations.
 
 `fastest_sound`, `look_ahead` and whatever ends in `+supervisor` take sound actions only. The
 others are there for contrast.

@@ -9,6 +9,9 @@ from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.timer import Timer
 
+# A simulated clock that waits for the answers to inputs stands this far behind them at most [s].
+SIMULATED_LEAD_S = 0.5
+
 
 def now_ns(node: Node) -> int:
     """Return the time of the node's clock, the one that stamps are compared with [ns]."""
@@ -18,6 +21,11 @@ def now_ns(node: Node) -> int:
 def is_simulated(node: Node) -> bool:
     """Tell whether the node's time comes from /clock."""
     return bool(node.get_parameter("use_sim_time").value)
+
+
+def allowed_lead_s(node: Node, lead_s: float) -> float:
+    """Return how far inputs may be ahead of the node's clock, if in real time it is `lead_s`."""
+    return max(lead_s, SIMULATED_LEAD_S) if is_simulated(node) else lead_s
 
 
 def on_clock_back(node: Node, react: Callable[[], None]) -> JumpHandle:

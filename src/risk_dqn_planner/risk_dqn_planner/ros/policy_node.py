@@ -5,6 +5,7 @@ import math
 import os
 import time
 import traceback
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -18,7 +19,7 @@ from risk_dqn_planner.policies.supervised import Supervisor, SupervisorMode, sup
 from risk_dqn_planner.policies.supervised_loading import config_of, is_sound, load_supervised
 from risk_dqn_planner.policies.trust import ANYTHING, listed
 from risk_dqn_planner.ros import conversions
-from risk_dqn_planner.ros.clock import now_ns, on_clock_back
+from risk_dqn_planner.ros.clock import allowed_lead_s, now_ns, on_clock_back
 from risk_dqn_planner.ros.decider import (
     Choice,
     Decider,
@@ -108,7 +109,9 @@ class PolicyNode(ManagedNode):
     def reconfigure(self) -> None:
         """Go by the present values of what may change at any time."""
         settings = self.declared.read(PolicyParameters)
-        self._decider.reconfigure(self.declared.read(DeciderConfig))
+        config = self.declared.read(DeciderConfig)
+        lead_s = allowed_lead_s(self, config.max_situation_ahead_s)
+        self._decider.reconfigure(replace(config, max_situation_ahead_s=lead_s))
         self._ticker.clock_timeout_s = self.declared.read(StandingClockParameters).clock_timeout_s
         self._output.marker_frame = settings.marker_frame
         mode = supervisor_mode(settings.supervisor)

@@ -17,7 +17,13 @@ from risk_dqn_planner.intersection.builder import build_intersection
 from risk_dqn_planner.intersection.config import IntersectionConfig
 from risk_dqn_planner.ros import conversions
 from risk_dqn_planner.ros.adapters.kinds import ObjectsAdapter
-from risk_dqn_planner.ros.clock import is_simulated, now_ns, on_clock_back, steady_timer
+from risk_dqn_planner.ros.clock import (
+    allowed_lead_s,
+    is_simulated,
+    now_ns,
+    on_clock_back,
+    steady_timer,
+)
 from risk_dqn_planner.ros.evaluation import Evaluation
 from risk_dqn_planner.ros.lifecycle import ManagedNode
 from risk_dqn_planner.ros.main import run_managed
@@ -101,6 +107,7 @@ class SituationNode(ManagedNode):
         """Go by the present values of what may change at any time."""
         config, ages = self.declared.read(SynchroniserConfig), self.declared.read(AgeLimits)
         patience_s = self.declared.read(ClockParameters).sim_time_patience_s
+        ages = replace(ages, max_input_ahead_s=allowed_lead_s(self, ages.max_input_ahead_s))
         if is_simulated(self):
             config = replace(config, sync_timeout_s=max(config.sync_timeout_s, patience_s))
         self._synchroniser.reconfigure(config, ages)

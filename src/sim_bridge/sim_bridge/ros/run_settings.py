@@ -24,13 +24,11 @@ DEFAULT_SCENARIO = "base"
 DEFAULT_MEMORY = SituationConfig.memory
 
 # Lock-step has time: on a busy computer a situation may reach the policy long after the clock,
-# which stands until both have answered, half a second behind the inputs at most.
+# which stands until both have answered.
 _LOCKSTEP: dict[str, ParameterValue] = {
     "use_sim_time": True,
     "sim_time_patience_s": 1.0,
     "clock_timeout_s": 30.0,
-    "max_input_ahead_s": 0.5,
-    "max_situation_ahead_s": 0.5,
 }
 
 

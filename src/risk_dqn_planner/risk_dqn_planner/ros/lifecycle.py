@@ -24,6 +24,7 @@ from rclpy.task import Future
 
 from risk_dqn_planner.errors import PlannerError
 from risk_dqn_planner.ros.declaration import Declared
+from risk_dqn_planner.ros.settling import settle
 
 _SUCCESS, _FAILURE = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
 # The answer to a last request is on its way for so long at most.
@@ -135,6 +136,7 @@ class ManagedNode(LifecycleNodeMixin, Node):
             self.get_logger().error(traceback.format_exc())
             problem = PlannerError(f"internal error: {error!r}")
         else:
+            settle()
             return super().on_configure(state)
         self.get_logger().error(f"not configured: {' '.join(str(problem).split())}")
         self.refuse(problem)

@@ -13,6 +13,7 @@ from intersection_msgs.msg import Situation
 
 from risk_dqn_planner.decision import Reason, explain, fault_decision
 from risk_dqn_planner.errors import ConfigurationError, InputError, PlannerError, PolicyError
+from risk_dqn_planner.explanation.warm_up import warm_up
 from risk_dqn_planner.faults import FaultyInput
 from risk_dqn_planner.policies.base import Policy
 from risk_dqn_planner.policies.supervised import Supervisor, SupervisorMode, supervisor_mode
@@ -90,6 +91,7 @@ class PolicyNode(ManagedNode):
         self.declared.read(StandingClockParameters)
         explains = partial(explain, config=config_of(assumptions), assumptions=assumptions)
         policy = _load(settings, assumptions, explains)
+        warm_up(config_of(assumptions), assumptions)
         self._supervisor = policy if isinstance(policy, Supervisor) else None
         self._sound = is_sound(policy)
         self._decider = Decider(policy, explains, config)

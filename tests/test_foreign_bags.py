@@ -29,7 +29,7 @@ from sim_bridge.ros.recording import Stored, installed_types, read_bag
 
 BAGS = Path(__file__).resolve().parents[1] / "bags"
 RECORDED = (*topics.INPUTS, topics.DECISION)
-PATIENCE_S = 300.0
+PATIENCE_S = 600.0
 AUTOWARE_NAMES = {
     "/odometry": "/localization/kinematic_state",
     "/objects": "/perception/object_recognition/tracking/objects",

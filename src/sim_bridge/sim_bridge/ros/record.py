@@ -34,6 +34,7 @@ from sim_bridge.ros.summary import episode_result
 from sim_bridge.ros.topics import DECISION, INPUTS
 
 _TOPICS = (*INPUTS, DECISION)
+_ATTEMPTS = 2  # on a busy computer decisions may come late
 _KEPT_AFTER_DECISION_NS = (0, 300_000_000)
 
 
@@ -54,13 +55,17 @@ def record(planned: PlannedBag, target: Path) -> str:
     """Drive one episode and write its bag; return how it went.
 
     Raises:
-        PlannerError: a setting is no good, a node died or the episode never ended.
+        PlannerError: a setting is no good, a node died, the episode never ended, or decisions
+        came late on a busy computer.
     """
     with (
         tempfile.TemporaryDirectory(prefix="record_") as log,
         closing(drive(planned.settings, [planned.seed], 0.0, Path(log))) as episodes,
     ):
         episode = next(episodes)
+        if episode.end.late_decisions:
+            # The ego braked for want of a decision, which another computer would not repeat.
+            raise BagError(f"{episode.end.late_decisions} decisions came late, record it again")
         kept = thinned(episode.messages)
         with BagWriter(target, _TOPICS, planned.notes()) as bag:
             bag.write(kept)
@@ -77,10 +82,12 @@ def _record_in_a_process(name: str, seed: int | None, folder: Path) -> str:
     command = [sys.executable, "-m", __spec__.name, "--child", str(folder), "--bag", name]
     if seed is not None:
         command += ["--seed", str(seed)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)  # noqa: S603 (this very program)
-    if done.returncode != 0:
-        raise BagError(f"{name} was not recorded: {done.stderr.strip() or done.returncode}")
-    return done.stdout.strip()
+    for _ in range(_ATTEMPTS):
+        done = subprocess.run(command, capture_output=True, text=True, check=False)  # noqa: S603 (this very program)
+        if done.returncode == 0:
+            return done.stdout.strip()
+        shutil.rmtree(folder / name, ignore_errors=True)
+    raise BagError(f"{name} was not recorded: {done.stderr.strip() or done.returncode}")
 
 
 def _accepted(new: Path, old: Path, reason: str | None) -> bool:

@@ -15,6 +15,7 @@ from typing import Any
 
 import pytest
 
+from risk_dqn_planner.ros.lifecycle import LifecycleParameters
 from risk_dqn_planner.ros.parameters import MapParameters, PolicyParameters
 from risk_dqn_planner.situation.config import SituationConfig
 from sim_bridge.ros import topics
@@ -148,8 +149,10 @@ def names(*configs: Any) -> set[str]:  # noqa: ANN401
 
 def test_nodes_get_parameters_that_they_know(monkeypatch: pytest.MonkeyPatch) -> None:
     planner, simulator = run(PLANNER, monkeypatch).nodes, run(SIMULATOR, monkeypatch).nodes
-    assert parameters(planner["situation"]) <= names(MapParameters, SituationConfig)
-    assert parameters(planner["policy"]) <= names(PolicyParameters)
+    assert parameters(planner["situation"]) <= names(
+        MapParameters, SituationConfig, LifecycleParameters
+    )
+    assert parameters(planner["policy"]) <= names(PolicyParameters, LifecycleParameters)
     assert parameters(simulator["simulator"]) <= names(SimulatorParameters, MapParameters) | {
         "route"
     }
@@ -178,7 +181,8 @@ def test_the_demo_is_both_on_one_map_and_one_clock(monkeypatch: pytest.MonkeyPat
     assert list(demo.includes) == ["simulator.launch.py", "planner.launch.py"]
     arguments = set(run(PLANNER, monkeypatch).arguments)
     assert set(demo.includes["planner.launch.py"]) <= arguments
-    assert demo.includes["planner.launch.py"]["use_sim_time"] == "true"
+    for fixed in ("use_sim_time", "autostart"):
+        assert demo.includes["planner.launch.py"][fixed] == "true"
     assert demo.used <= set(run(SIMULATOR, monkeypatch).arguments)
 
 

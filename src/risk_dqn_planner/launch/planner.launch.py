@@ -32,6 +32,7 @@ def arguments() -> list[DeclareLaunchArgument]:
         ("memory", SituationConfig.memory, "Of hidden space: instantaneous or tracked"),
         ("parameters", str(SHARE / "config" / "planner.yaml"), "File of all other parameters"),
         ("use_sim_time", "false", "Take the time from /clock"),
+        ("autostart", "true", "Configure and activate the nodes; else a lifecycle manager does"),
         ("namespace", "", "Namespace of the nodes"),
         ("log_level", "info", "debug, info, warn, error or fatal"),
         ("rviz", "false", "Start RViz with the planner's view"),
@@ -78,7 +79,8 @@ def parameter(name: str, kind: type) -> ParameterValue:
 def generate_launch_description() -> LaunchDescription:
     """Nodes and their arguments."""
     sim_time = {"use_sim_time": parameter("use_sim_time", bool)}
-    situation_parameters = sim_time | {
+    common = sim_time | {"autostart": parameter("autostart", bool)}
+    situation_parameters = common | {
         "map_file": parameter("map_file", str),
         "map_origin_latitude": parameter("map_origin_latitude", float),
         "map_origin_longitude": parameter("map_origin_longitude", float),
@@ -92,7 +94,7 @@ def generate_launch_description() -> LaunchDescription:
     )
     policy = node(
         "policy",
-        sim_time | {name: parameter(name, str) for name in ("policy", "supervisor")},
+        common | {name: parameter(name, str) for name in ("policy", "supervisor")},
         [("input/situation", "situation"), ("output/decision", "decision")],
     )
     rviz = Node(

@@ -33,6 +33,7 @@ def generate_launch_description() -> LaunchDescription:
                 "planner",
                 map_file=LaunchConfiguration("map_file"),
                 use_sim_time="true",
+                autostart="true",  # the argument of that name is the simulator's
             ),
         ]
     )

@@ -15,7 +15,7 @@ from risk_dqn_planner.errors import PlannerError
 from risk_dqn_planner.faults import FaultyInput
 from risk_dqn_planner.intersection.builder import build_intersection
 from risk_dqn_planner.intersection.config import IntersectionConfig
-from risk_dqn_planner.ros import conversions
+from risk_dqn_planner.ros import conversions, markers
 from risk_dqn_planner.ros.adapters.kinds import ObjectsAdapter
 from risk_dqn_planner.ros.clock import (
     allowed_lead_s,
@@ -92,6 +92,7 @@ class SituationNode(ManagedNode):
         )
         # Compile, so that the first message need not wait.
         example_situation(situation)
+        markers.warm_up()
         Plausibility().check(example_perception(), 0.0, 0.0)
         self._evaluation = Evaluation(maps, ego, objects, pipeline, Plausibility(), self._complain)
         self._output.frame_id = maps.map_frame
@@ -186,7 +187,7 @@ class SituationNode(ManagedNode):
             report, seen = evaluation.report(due)
             self._publish(report)
             if seen is not None:
-                self._output.show(evaluation.pipeline.model, report, seen)
+                self._output.show(evaluation.pipeline, report, seen)
         else:
             self._publish(evaluation.fault(due))
 

@@ -7,7 +7,6 @@ from intersection_msgs.msg import Situation
 from rclpy.node import Node
 from visualization_msgs.msg import MarkerArray
 
-from risk_dqn_planner.intersection.model import IntersectionModel
 from risk_dqn_planner.ros import markers
 from risk_dqn_planner.ros.clock import now_ns
 from risk_dqn_planner.ros.conversions import situation_to_message
@@ -48,12 +47,12 @@ class SituationOutput:
         values = {"status": report.status.name, "faulty_input": report.source.name}
         self._diagnostics.set("situation", level, report.text or "available", values)
 
-    def show(
-        self, model: IntersectionModel | None, report: SituationReport, seen: Perception
-    ) -> None:
+    def show(self, pipeline: SituationPipeline, report: SituationReport, seen: Perception) -> None:
         """Publish markers of a report, if anybody looks at them."""
+        model = pipeline.model
         if model is not None and self._marker_publisher.get_subscription_count() > 0:
-            shown = markers.situation_markers(model, report, seen, self.frame_id)
+            places = pipeline.hidden_places
+            shown = markers.situation_markers(model, report, seen, self.frame_id, places)
             self._marker_publisher.publish(shown)
 
     def silent_for(self, span_ns: int) -> bool:

@@ -65,7 +65,8 @@ def stream_status(
     if age_s > stream.limits.max_input_age_s:
         limit_s = stream.limits.max_input_age_s
         return STALE, f"{age_s:.2f} s old, expected at most {limit_s:g} s", values
-    if fault is not None and 0 <= now_ns - fault.stamp_ns <= recent_ns:
+    # Faults may be stamped ahead of the clock, but one of before the clock went back is over.
+    if fault is not None and abs(now_ns - fault.stamp_ns) <= recent_ns:
         return ERROR, f"{fault.status.name}: {fault.text}", values
     if rate_hz is None:
         return OK, "received", values

@@ -54,6 +54,12 @@ class PlausibilityLimits:
     )
     max_object_length_m: float = _limit(50.0, "A longer object is a fault [m]", 1.0, 1000.0)
     max_object_width_m: float = _limit(6.0, "A wider object is a fault [m]", 1.0, 1000.0)
+    max_distance_m: float = _limit(
+        1000.0,
+        "An object or a corner of the visible area further from the ego is a fault [m]",
+        10.0,
+        100000.0,
+    )
     max_objects: int = _limit(1000, "More objects in one list are a fault", 1, 100000)
     min_visible_area_m2: float = _limit(
         1.0, "A visible area that is smaller is a fault [m^2]", 0.001, 1000.0

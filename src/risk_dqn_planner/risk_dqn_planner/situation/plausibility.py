@@ -30,6 +30,8 @@ _CROSSING_TOLERANCE_M = 0.1
 # An ego this slow need not move, and one that moves so little does not.
 _STANDSTILL_MPS = 0.5
 _STANDSTILL_M = 0.1
+# Headings may go on counting for some turns.
+_MAX_HEADING_RAD = 100.0
 # Objects that were not seen for so long may be anywhere, and ids may be given anew.
 _REMEMBERED_S = 2.0
 
@@ -77,6 +79,7 @@ class Plausibility:
         self._check_ego(_Ego(ego_time_s, seen.ego))
         self._check_objects(seen.objects, objects_time_s)
         self._check_area(seen.visible_area)
+        self._check_distances(seen)
 
     def _check_ego(self, now: _Ego) -> None:
         limit_mps, speed_mps = self.limits.max_ego_speed_mps, now.pose.speed_mps
@@ -131,6 +134,7 @@ class Plausibility:
             (Status.IMPLAUSIBLE_SPEED, "speed_mps", limits.max_object_speed_mps),
             (Status.INVALID_SIZE, "length_m", limits.max_object_length_m),
             (Status.INVALID_SIZE, "width_m", limits.max_object_width_m),
+            (Status.MALFORMED_INPUT, "heading_rad", _MAX_HEADING_RAD),
         ):
             values = getattr(objects, name)
             worst = int(np.argmax(np.abs(values))) if count else -1
@@ -175,6 +179,33 @@ class Plausibility:
         order = np.argsort(joined[0], kind="stable")
         return _Seen(*(column[order] for column in joined))
 
+    def _check_distances(self, seen: Perception) -> None:
+        """Raise InputError if something is where no sensor of the ego can have seen it.
+
+        If nothing that is visible is near, the ego itself is elsewhere: its route tells of that.
+        """
+        limit_m, ego = self.limits.max_distance_m, seen.ego
+        corners_m = _distances(ego, seen.visible_area[:, 0], seen.visible_area[:, 1])
+        if corners_m.min() > limit_m:
+            return
+        far = int(np.argmax(corners_m))
+        if corners_m[far] > limit_m:
+            text = f"corner {far} is {corners_m[far]:.3g} m from the ego"
+            raise InputError(
+                f"visible area: {text}, expected at most {limit_m:g} m",
+                Status.INVALID_VISIBLE_AREA,
+                FaultyInput.VISIBLE_AREA,
+            )
+        objects_m = _distances(ego, seen.objects.x_m, seen.objects.y_m)
+        if objects_m.max(initial=0.0) > limit_m:
+            far = int(np.argmax(objects_m))
+            text = f"object {seen.objects.id[far]}: {objects_m[far]:.3g} m from the ego"
+            raise InputError(
+                f"{text}, expected at most {limit_m:g} m",
+                Status.MALFORMED_INPUT,
+                FaultyInput.OBJECTS,
+            )
+
     def _check_area(self, corners: Floats) -> None:
         limits, where = self.limits, FaultyInput.VISIBLE_AREA
         kind = Status.INVALID_VISIBLE_AREA
@@ -191,3 +222,10 @@ class Plausibility:
         if not area_m2 >= limits.min_visible_area_m2:
             text = f"encloses {area_m2:.3g} m^2, expected at least {limits.min_visible_area_m2:g}"
             raise InputError(f"visible area: {text}", kind, where)
+
+
+def _distances(ego: EgoPose, x_m: Floats, y_m: Floats) -> Floats:
+    """Return how far places (N,) are from the ego [m]; huge coordinates are infinitely far away."""
+    with np.errstate(over="ignore"):
+        away_m: Floats = np.hypot(x_m - ego.x_m, y_m - ego.y_m)
+    return away_m

@@ -53,3 +53,12 @@ def test_a_fault_is_an_error_while_it_is_recent_and_counted_for_ever() -> None:
         one.receive(stamp_ms * MS, "message", stamp_ms * MS, stamp_ms * MS)
     level, _, values = stream_status(one, 1950 * MS, RATES)
     assert (level, values["faults"]) == (OK, {"NOT_FINITE": 1})
+
+
+def test_a_fault_that_is_stamped_ahead_of_the_clock_is_an_error_now() -> None:
+    one = stream(*range(0, 1000, 100))
+    one.note(Fault(1200 * MS, Status.FUTURE_INPUT, FaultyInput.OBJECTS, "ahead"))
+    assert stream_status(one, 1000 * MS, RATES)[0] == ERROR
+    # A clock that has gone back by more leaves it behind.
+    one.receive(0, "message", 0, 0)
+    assert stream_status(one, 0, RATES)[0] == OK

@@ -125,6 +125,7 @@ def test_an_id_that_was_not_seen_for_two_seconds_may_be_another_vehicle_s() -> N
         (object_arrays([[0.0, 0.0, 0.0, 1.0]], size_m=(4.0, 7.0)), Status.INVALID_SIZE),
         (object_arrays([[0.0, 0.0, 0.0, 1.0]], size_m=(-4.0, 2.0)), Status.INVALID_SIZE),
         (object_arrays([[0.0, 0.0, math.nan, 1.0]]), Status.NOT_FINITE),
+        (object_arrays([[0.0, 0.0, 1e300, 1.0]]), Status.MALFORMED_INPUT),
         (object_arrays(np.zeros((1001, 4))), Status.INVALID_SIZE),
     ],
 )
@@ -161,6 +162,22 @@ def test_an_outline_that_only_touches_itself_is_simple() -> None:
     # A notch whose sides lie on each other, and corners rounded by 1 cm.
     notch = np.array([[0, 0], [9, 0], [9, 9], [5, 9], [5.01, 2], [4.99, 2], [5, 9], [0, 9.0]])
     assert see(Plausibility(), area=notch) is None
+
+
+SPIKE = np.array([[-20.0, -20.0], [20.0, -20.0], [3e38, 0.0], [20.0, 20.0], [-20.0, 20.0]])
+
+
+def test_what_no_sensor_of_the_ego_can_see_is_a_fault_of_who_says_so() -> None:
+    spike = (Status.INVALID_VISIBLE_AREA, FaultyInput.VISIBLE_AREA)
+    far = (Status.MALFORMED_INPUT, FaultyInput.OBJECTS)
+    assert see(Plausibility(), area=SPIKE) == spike
+    for x_m, found in ((999.0, None), (1001.0, far), (-1e300, far)):
+        assert see(Plausibility(), objects=object_arrays([[x_m, 0.0, 0.0, 0.0]])) == found
+
+
+def test_it_is_not_blamed_for_an_ego_that_is_elsewhere() -> None:
+    ego = EgoPose(1e300, 0.0, 0.0, 0.0)
+    assert see(Plausibility(), ego=ego, objects=object_arrays([[0.0] * 4])) is None
 
 
 def test_limits_that_make_no_sense_are_refused() -> None:

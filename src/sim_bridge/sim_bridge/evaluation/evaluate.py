@@ -2,7 +2,9 @@
 """Evaluates policies in every situation of the paper's figures, on the same episodes each.
 
 Writes results.json and the paper's four figures into the output folder. Interrupted, the same
-command goes on where it was. Exit code: 0 done, 2 an option is no good, 130 interrupted.
+command goes on where it was. The set soundness takes hours (--episodes says how many): commands for
+single maps may run side by side into one folder, then one for all puts their cells together.
+Exit code: 0 done, 2 an option is no good, 130 interrupted.
 """
 
 import argparse

@@ -8,10 +8,11 @@ From before publishing until the decision arrives: transport both ways, conversi
 supervisor and explanation.
 """
 
+import struct
 import time
 from pathlib import Path
 
-from intersection_msgs.msg import Situation
+from intersection_msgs.msg import Decision, Situation
 from rclpy.node import Node
 from rclpy.serialization import serialize_message
 from rosgraph_msgs.msg import Clock
@@ -29,6 +30,7 @@ from sim_bridge.ros.session import SilentPlannerError, ros_session, wait_until
 
 START_S = 240.0
 _WARM_UP = 10
+_FIRST_FAULT = 20  # reasons from here on are faults, see Decision.msg
 _NOTICE_S = 0.03  # the node has seen the clock by then
 _ANSWER_S = 0.5
 _LOST = 0.05  # share of the clock's messages, which are best effort, that may be lost
@@ -57,10 +59,18 @@ def situations(model: IntersectionModel, objects: int, count: int) -> list[bytes
     return made
 
 
+def restamped(situation: bytes, stamp_ns: int) -> bytes:
+    """Return a serialised message, whose first field is a header, with another stamp."""
+    order = "<" if situation[1] & 1 else ">"
+    stamp = struct.pack(f"{order}iI", *divmod(stamp_ns, conversions.SECOND_NS))
+    return situation[:4] + stamp + situation[12:]
+
+
 class _Asker:
     """Lets the time of a policy node go on, and publishes situations to it."""
 
     def __init__(self, node: Node) -> None:
+        self.now_ns = 0
         self.decisions = Ear(node, topics.DECISION)
         self._clock = node.create_publisher(Clock, "/clock", 10)
         self._situations = node.create_publisher(
@@ -72,8 +82,20 @@ class _Asker:
         publishers = (self._clock, self._situations)
         return all(publisher.get_subscription_count() > 0 for publisher in publishers)
 
-    def ask(self, stamp_ns: int, situation: bytes) -> float | None:
-        """Return how long the decision took [ms], None if the node missed the clock."""
+    def is_loaded(self) -> bool:
+        """Let half a second pass, and tell whether the policy is there."""
+        self.now_ns += DECISION_PERIOD_NS
+        self._clock.publish(Clock(clock=conversions.to_stamp(self.now_ns)))
+        decision: Decision | None = self.decisions.newest()
+        return decision is not None and decision.reason != Decision.POLICY_NOT_READY
+
+    def ask(self, situation: bytes) -> float | None:
+        """Let half a second pass; return how long the decision took [ms].
+
+        None if the node missed the clock, or the decision is not the policy's.
+        """
+        self.now_ns += DECISION_PERIOD_NS
+        stamp_ns, situation = self.now_ns, restamped(situation, self.now_ns)
         self._clock.publish(Clock(clock=conversions.to_stamp(stamp_ns)))
         time.sleep(_NOTICE_S)
         began_s = time.perf_counter()
@@ -82,7 +104,8 @@ class _Asker:
         if arrival is None:
             return None
         decision = self.decisions.read(arrival)
-        if conversions.to_ns(decision.situation_stamp) != stamp_ns:
+        is_fault = decision.reason >= _FIRST_FAULT
+        if is_fault or conversions.to_ns(decision.situation_stamp) != stamp_ns:
             return None
         return 1e3 * (arrival.at_s - began_s)
 
@@ -97,10 +120,9 @@ def answers(settings: RunSettings, asked: list[bytes], logs: Path) -> Spread:
     with ros_session("bench") as node, NodeGroup([policy], logs) as nodes:
         asker = _Asker(node)
         wait_until(asker.heard, "the policy node", START_S, nodes.check)
+        wait_until(asker.is_loaded, "the policy", START_S, nodes.check)
         with undisturbed():
-            took = [
-                asker.ask(k * DECISION_PERIOD_NS, situation) for k, situation in enumerate(asked, 1)
-            ]
+            took = [asker.ask(situation) for situation in asked]
         nodes.check()
     timed = [took_ms for took_ms in took[_WARM_UP:] if took_ms is not None]
     if len(timed) < (1.0 - _LOST) * len(took[_WARM_UP:]):

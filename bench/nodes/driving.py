@@ -27,13 +27,13 @@ from risk_dqn_planner.ros import conversions
 from sim_bridge.ros import topics
 from sim_bridge.ros.node_group import NodeGroup
 from sim_bridge.ros.run_settings import RunSettings
-from sim_bridge.ros.session import SilentPlannerError, ros_session
+from sim_bridge.ros.session import SilentPlannerError, ros_session, wait_until
 from sim_bridge.ros.soak.processes import computed_s
 
 PERIOD_S = 0.1
 DECISION_PERIOD_S = 0.5
 START_S = 240.0
-SETTLE_S = 3.0
+SETTLE_S = 5.0
 _FIRST_FAULT = 20  # reasons from here on are faults, see Decision.msg
 
 
@@ -72,18 +72,12 @@ class Sender:
         self._publishers[0].publish(conversions.route_to_message(route, 0))
         self._scene = scene
         self._count = 0
-        self._set_off_at: int | None = None
         self._began_s, self._began_ns = time.perf_counter(), time.time_ns()
         self.sent_s: dict[int, float] = {}
         self._next = self._prepare()
 
-    def set_off(self) -> None:
-        """Let the scene, which stood at its beginning so far, move on from now on."""
-        self._set_off_at = self._count
-
     def _prepare(self) -> list[bytes]:
-        moved = 0 if self._set_off_at is None else self._count - self._set_off_at
-        messages = self._scene.inputs(moved * PERIOD_S, self.stamp_ns)
+        messages = self._scene.inputs(self._count * PERIOD_S, self.stamp_ns)
         return [serialize_message(message) for message in messages]
 
     @property
@@ -129,11 +123,12 @@ def drive(
             with bound_to(cores.nodes):
                 nodes = running.enter_context(group)
             situations, decisions = Ear(node, topics.SITUATION), Ear(node, topics.DECISION)
-            scene = MovingScene(model, objects, duration_s, seed=1)
+            scene = MovingScene(model, objects, duration_s + SETTLE_S, seed=1)
+            wait_until(lambda: _is_loaded(decisions), "the policy", START_S, nodes.check)
             sender = Sender(node, scene, model.route)
-            _await_decisions(sender, situations, decisions, nodes)
             with busy_loops(cores.busy), undisturbed():
                 _play(sender, situations, SETTLE_S)
+                _require_decisions(decisions)
                 for heard in (sender.sent_s, situations, decisions):
                     heard.clear()
                 before_s = _computed_s(nodes)
@@ -149,18 +144,15 @@ def _computed_s(nodes: NodeGroup) -> dict[str, float]:
     return {name: computed_s(pid) for name, pid in nodes.pids().items()}
 
 
-def _await_decisions(sender: Sender, situations: Ear, decisions: Ear, nodes: NodeGroup) -> None:
-    """Play, with the scene standing at its beginning, until decisions are the policy's own."""
-    deadline = time.monotonic() + START_S
-    while time.monotonic() < deadline:
-        _play(sender, situations, DECISION_PERIOD_S)
-        nodes.check()
-        decision: Decision | None = decisions.newest()
-        if decision is not None and decision.reason < _FIRST_FAULT:
-            sender.set_off()
-            return
-    text = "nothing" if decision is None else decision.text
-    raise SilentPlannerError(f"the planner does not decide on the traffic, it says {text}")
+def _is_loaded(decisions: Ear) -> bool:
+    decision: Decision | None = decisions.newest()
+    return decision is not None and decision.reason != Decision.POLICY_NOT_READY
+
+
+def _require_decisions(decisions: Ear) -> None:
+    decision: Decision = decisions.newest()
+    if decision.reason >= _FIRST_FAULT:
+        raise SilentPlannerError(f"the planner does not decide on the traffic: {decision.text}")
 
 
 def _play(sender: Sender, situations: Ear, duration_s: float) -> None:

@@ -35,6 +35,9 @@ COLLISION_AWARE_PAPER := --preset paper --reward collision --name collision_awar
 TUNED := --preset tuned --reward collision --steps 3000000 --name tuned \
   --map four_way,t_junction,multi_lane,roundabout \
   --scenario base,dense_traffic,severe_occlusion,close_small_obstacle
+SOUND_DQN := --preset advised --reward progress --steps 800000 --supervisor enforce \
+  --name sound_dqn --map four_way,t_junction,multi_lane,roundabout \
+  --scenario base,dense_traffic,severe_occlusion,close_small_obstacle
 
 .PHONY: help setup demo test replay bags convert maps train trainings evaluate ship bench soak timing shell format lint types check clean distclean
 
@@ -79,7 +82,8 @@ trainings: ## train all policies of the evaluation, one after another [SEEDS='0 
 	@$(WITH_ROS) bash -c 'for seed in $(SEEDS); do \
 	  $(SIMULATION)/train $(RISK_AWARE_PAPER) --seed $$seed || exit; \
 	  $(SIMULATION)/train $(COLLISION_AWARE_PAPER) --seed $$seed || exit; \
-	  $(SIMULATION)/train $(TUNED) --seed $$seed || exit; done'
+	  $(SIMULATION)/train $(TUNED) --seed $$seed || exit; \
+	  $(SIMULATION)/train $(SOUND_DQN) --seed $$seed || exit; done'
 
 evaluate: ## drive policies through all cells [SET=soundness EPISODES POLICIES SCENARIOS MAP ROUTE ORIGIN REPORT]
 	@$(WITH_ROS) $(SIMULATION)/evaluate $(call option,--set,SET) $(call option,--episodes,EPISODES) \

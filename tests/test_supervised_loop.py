@@ -13,7 +13,6 @@ from test_closed_loop import run_demo
 from risk_dqn_planner.decision import Action, Reason
 from risk_dqn_planner.map.loader import load_map
 from risk_dqn_planner.policies.base import Supervision
-from risk_dqn_planner.policies.shipped import DEFAULT_POLICY
 from risk_dqn_planner.policies.supervised import SupervisorMode
 from risk_dqn_planner.policies.supervised_loading import load_supervised
 from risk_dqn_planner.ros.conversions import decision_from_message, to_ns
@@ -25,7 +24,8 @@ from sim_bridge.ros.run_settings import own_map_settings
 pytestmark = pytest.mark.ros
 
 MAP = "multi_lane"
-SEED = 7  # an episode in which the trained policy is overruled
+POLICY = "tuned"
+SEED = 7  # an episode in which it is overruled
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ def in_the_nodes(folder: Path, *options: str) -> list[Decision]:
 
 def in_the_simulation() -> list[Step]:
     """Drive the episode in this process."""
-    settings = own_map_settings(MAP)
+    settings = own_map_settings(MAP, POLICY)
     road_map = load_map(settings.map_file, settings.origin, settings.projector)
     simulation = SimulationShelf(road_map, settings.route).get(settings.scenario)
     simulation.reset([SEED])
@@ -72,10 +72,10 @@ def in_the_simulation() -> list[Step]:
 
 
 def test_the_nodes_decide_as_the_supervisor_does_in_the_batched_simulation(tmp_path: Path) -> None:
-    decisions = in_the_nodes(tmp_path)
+    decisions = in_the_nodes(tmp_path, "--policy", POLICY)
     expected = in_the_simulation()
     assert [Step(d.action, d.supervisor, d.proposed) for d in decisions] == expected
-    assert {d.policy_name for d in decisions} == {f"{DEFAULT_POLICY}+supervisor"}
+    assert {d.policy_name for d in decisions} == {f"{POLICY}+supervisor"}
 
 
 def test_what_is_overruled_is_said_with_what_was_proposed(tmp_path: Path) -> None:

@@ -14,7 +14,7 @@ FOLDER = "models"
 SUMS = "SHA256SUMS"
 PACKAGE = "risk_dqn_planner"
 # What decides where nobody says which policy shall, and what its supervisor does.
-DEFAULT_POLICY = "tuned"
+DEFAULT_POLICY = "sound_dqn"
 DEFAULT_SUPERVISOR = "report"
 
 

@@ -28,11 +28,12 @@ POLICIES: dict[str, Callable[[], Policy]] = {
     "sound": FastestSoundPolicy,
     "delayed": lambda: FastestSoundPolicy(DELAYED),
     "ahead": LookAheadPolicy,
-    "learned": lambda: load_policy(DEFAULT_POLICY),
-    "supervised": lambda: Supervisor(load_policy(DEFAULT_POLICY)),
+    "learned": lambda: load_policy("tuned"),
+    "sound_learned": lambda: load_policy(DEFAULT_POLICY),
+    "supervised": lambda: Supervisor(load_policy("tuned")),
     "reported": lambda: Supervisor(ConstantPolicy(Action.FAST), SupervisorMode.REPORT),
 }
-CHECKED = ("sound", "delayed", "ahead", "supervised", "reported")
+CHECKED = ("sound", "delayed", "ahead", "sound_learned", "supervised", "reported")
 
 
 @pytest.fixture(scope="module")

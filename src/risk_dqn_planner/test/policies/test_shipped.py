@@ -36,7 +36,7 @@ every_policy = pytest.mark.parametrize("policy", POLICIES.values(), ids=POLICIES
 
 
 def test_the_paper_s_two_networks_and_the_default_are_shipped() -> None:
-    assert {"risk_aware_paper", "collision_aware_paper", "tuned"} <= POLICIES.keys()
+    assert {"risk_aware_paper", "collision_aware_paper", "tuned", "sound_dqn"} <= POLICIES.keys()
     assert DEFAULT_POLICY in POLICIES
     assert POLICIES.keys() <= set(policy_names())
 
@@ -73,9 +73,10 @@ def test_it_is_loaded_by_its_name_and_decides(policy: ShippedPolicy) -> None:
     assert (loaded.name, loaded.hash) == (policy.name, policy.sha256)
     for restart in (True, False):
         decisions = loaded.decide(example_situation(), np.array([restart]))
-        assert decisions.reason[0] == Reason.LEARNED
         assert np.isfinite(decisions.q_values).all()
-        assert decisions.action[0] == decisions.q_values[0].argmax()
+        wanted = decisions.action if decisions.proposed is None else decisions.proposed
+        assert wanted[0] == decisions.q_values[0].argmax()
+        assert (decisions.reason[0] == Reason.LEARNED) == (decisions.action[0] == wanted[0])
 
 
 @every_policy

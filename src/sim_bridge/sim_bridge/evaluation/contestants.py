@@ -18,7 +18,7 @@ from sim_bridge.evaluation.clairvoyant import NAME as CLAIRVOYANT
 from sim_bridge.evaluation.rollout import Clairvoyant, Contestant, PolicyContestant
 from sim_bridge.evaluation.training_runs import Training, named_runs, training_of, training_runs
 
-LEARNED_POLICIES = ("risk_aware_paper", "collision_aware_paper", "tuned")
+LEARNED_POLICIES = ("risk_aware_paper", "collision_aware_paper", "tuned", "sound_dqn")
 DEFAULT_POLICIES = ("rule_based", "always_fast", *LEARNED_POLICIES, CLAIRVOYANT)
 
 

@@ -138,12 +138,12 @@ def page_of(results: Mapping[str, Sequence[Figures]], reference: Run, episodes: 
     by_scenario = {name: f"{name} %" for name in reference.scenarios}
     meanings = [f"- `{name}`: {MEANING[name]}." for name in results]
     config = reference.config
+    where = f"{', '.join(reference.map_names)} in\n{', '.join(reference.scenarios)}"
     about = (
         f"Preset `{config.preset}`, reward `{reference.reward}`, {config.steps} environment steps "
-        f"on {', '.join(reference.map_names)}\nin {', '.join(reference.scenarios)}; {episodes} test "
-        "episodes in each cell, the same ones for every\npolicy and none of them seen in training. "
-        "Every action taken is sound. Each entry is the mean over the\nseeds of the trainings, with "
-        "the lowest and the highest of them.\n"
+        f"on {where};\n{episodes} test episodes in each cell, the same ones for every policy and "
+        "none of them seen in\ntraining. Every action taken is sound. Each entry is the mean over "
+        "the seeds of the\ntrainings, with the lowest and the highest of them.\n"
     )
     return "\n".join(
         [

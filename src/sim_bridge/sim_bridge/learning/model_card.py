@@ -22,11 +22,24 @@ must keep the vehicle in its lane and from running into whatever it meets. It is
 function and has never driven a real vehicle.
 """
 
-_LIMITS = f"""\
+_UNTAUGHT = """\
 - What it was not trained on, it was not taught: other maps, speeds, vehicle sizes and ways of
   giving way are outside its experience unless they stand in the results above.
+"""
+
+_PAPER_STATE = f"""\
 - The state holds {VEHICLES} vehicles and {LANES} lanes, the most critical ones; it does not see
   the others.
+"""
+
+_OUTLOOK = f"""\
+- The state holds {VEHICLES} vehicles and {LANES} lanes, the most critical ones; of the others it
+  knows by the margins alone, which rest on traffic that keeps its speed.
+- Sound is what the joint check calls so: if its assumptions are broken, it can collide; and it
+  promises no progress.
+"""
+
+_LIMITS = """\
 - Vehicles are assumed to follow their lanes; pedestrians and cyclists are out of scope.
 - A network gives no reason for its choice. The risks shown with a decision are Algorithm 1's.
 """
@@ -177,8 +190,10 @@ def _limits(policy: ShippedPolicy, origin: Origin, lines: Sequence[Line]) -> str
         worst = min(own, key=lambda line: float(line["success"]["rate"]))
         map_name, traffic, scenario, range_m = _cell(worst)
         where = f"on {map_name}, {scenario} with {traffic} traffic, seen to {range_m:g} m"
+        can = "It can collide" if collided else "Collisions"
         items += [
-            f"- It can collide: {collided} of all {episodes} episodes above ended so.",
+            f"- {can}: {collided} of all {episodes} episodes above ended so.",
             f"- Least success: {100.0 * worst['success']['rate']:.1f} %, {where}.",
         ]
-    return "## Known limits\n\n" + "\n".join(items) + "\n" + _LIMITS
+    seen = _OUTLOOK if origin.looks else _PAPER_STATE
+    return "## Known limits\n\n" + "\n".join(items) + "\n" + _UNTAUGHT + seen + _LIMITS

@@ -64,10 +64,20 @@ class Origin:
 
     @property
     def company(self) -> list[tuple[str, str]]:
-        """What it learned under, by name: an enforcing supervisor, a memory of hidden space."""
-        return [
+        """What it learned under, by name: an enforcing supervisor, a memory, an expert."""
+        found = [
             (name, str(self.run[name])) for name in ("supervisor", "memory") if name in self.run
         ]
+        if self.looks:
+            found.append(("outlook", "what is sound, where to wait, margins of going later"))
+        if "advice" in self.run["config"]:
+            found.append(("advice", "of the look-ahead search"))
+        return found
+
+    @property
+    def looks(self) -> bool:
+        """Whether its network is told more than the paper's state."""
+        return bool(self.run["config"].get("outlook", False))
 
     @property
     def default_name(self) -> str:

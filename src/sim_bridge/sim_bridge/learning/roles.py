@@ -48,8 +48,17 @@ ROLES = {
         reward="collision",
     ),
     "tuned": Role(
-        purpose="The planner's default: the paper's network and state, trained with more "
-        "episodes side by side, larger batches and a higher learning rate than the paper's.",
+        purpose="The paper's network and state, trained with more episodes side by side, larger "
+        "batches and a higher learning rate than the paper's. It decides without a supervisor, "
+        "and then it can collide.",
+    ),
+    "sound_dqn": Role(
+        purpose="The planner's default. Its supervisor is part of it, in training and on the "
+        "vehicle: it takes sound actions only (docs/safety.md), and its network is told which "
+        "these are, where the ego can wait, and how much time there would be if it waited and "
+        "then went. It learned by Q-learning with the advice of the look-ahead search, and "
+        "searches nothing itself.",
+        preset="advised",
     ),
 }
 

@@ -62,8 +62,8 @@ def bags() -> dict[str, PlannedBag]:
             "four_way", "base", DEFAULT_POLICY, 3, DEFAULT_SUPERVISOR,
         ),
         "dense_traffic": _bag(
-            "Many vehicles close behind each other; the supervisor overrules the default policy",
-            "four_way", "dense_traffic", DEFAULT_POLICY, 133, "enforce",
+            "Many vehicles close behind each other; the supervisor overrules a daring policy",
+            "four_way", "dense_traffic", _DARING, 133, "enforce",
         ),
         "severe_occlusion": _remembering(
             _bag(

@@ -30,7 +30,7 @@ def seeds_of(names: list[str], *folders: Path) -> list[tuple[str, int | None]]:
 
 
 def test_the_papers_policies_and_ours_take_part_by_default() -> None:
-    learned = ["risk_aware_paper", "collision_aware_paper", "tuned"]
+    learned = ["risk_aware_paper", "collision_aware_paper", "tuned", "sound_dqn"]
     assert list(DEFAULT_POLICIES) == ["rule_based", "always_fast", *learned, "clairvoyant"]
 
 

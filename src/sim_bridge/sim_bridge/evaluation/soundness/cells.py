@@ -10,12 +10,12 @@ from sim_bridge.evaluation.cells import BASE, FINITE, RESPAWNING, Cell
 from sim_bridge.scenarios.loading import load_scenario, scenario_names
 
 FASTEST_SOUND, LOOK_AHEAD, RULE_BASED = "fastest_sound", "look_ahead", "rule_based"
-TUNED, SUPERVISED = "tuned", "tuned+supervisor"
-POLICIES = (FASTEST_SOUND, LOOK_AHEAD, SUPERVISED, TUNED, RULE_BASED)
+TUNED, SUPERVISED, SOUND_DQN = "tuned", "tuned+supervisor", "sound_dqn"
+POLICIES = (FASTEST_SOUND, LOOK_AHEAD, SOUND_DQN, SUPERVISED, TUNED, RULE_BASED)
 # Those that search at each decision, and so take a hundred times as long.
 SEARCHING = (LOOK_AHEAD,)
 # Those whose every action is sound where the assumptions hold.
-SOUND = (FASTEST_SOUND, LOOK_AHEAD, SUPERVISED)
+SOUND = (FASTEST_SOUND, LOOK_AHEAD, SOUND_DQN, SUPERVISED)
 
 GOAL, MEMORY, FRONTIER, VIOLATED = "goal", "memory", "frontier", "violated"
 PARTS = (GOAL, MEMORY, FRONTIER, VIOLATED)

@@ -29,7 +29,7 @@ def draw_frontier(lines: Sequence[Line], folder: Path) -> list[Path]:
     groups = by_traffic(lines)
     if not policies_of(lines):
         return []
-    figure = Figure(figsize=(WIDTH_IN, 0.8 + 3.6 * len(groups)), layout="constrained")
+    figure = Figure(figsize=(WIDTH_IN, 0.8 + 2.4 * len(groups)), layout="constrained")
     panels = figure.subplots(len(groups), 2, squeeze=False)
     figure.suptitle("Accepted risk: the highest speed [m/s] ascribed to hidden vehicles")
     for (left, right), (traffic, own) in zip(panels, groups.items(), strict=True):

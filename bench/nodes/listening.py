@@ -22,7 +22,7 @@ _DEPTH = 100
 class Spread(NamedTuple):
     """How long something takes: how often it was timed; median, 99th percentile, longest [ms]."""
 
-    count: int
+    timed: int
     p50_ms: float
     p99_ms: float
     max_ms: float

@@ -120,9 +120,9 @@ def drives(bench: Mapping[str, Any]) -> str:
             (
                 name,
                 *(f"{situation[key]:.1f}" for key in ("p50_ms", "p99_ms", "max_ms")),
-                f"{found['late']} of {situation['count']}",
+                f"{found['late']} of {situation['timed']}",
                 *(f"{uneven[key]:.1f}" for key in ("p50_ms", "p99_ms", "max_ms")),
-                str(uneven["count"]),
+                str(uneven["timed"]),
                 f"{computed['situation_node']:.1f}",
             )
         )
@@ -136,7 +136,7 @@ def drives(bench: Mapping[str, Any]) -> str:
 def decisions(bench: Mapping[str, Any]) -> str:
     """Return the table of decisions by policy."""
     rows = [
-        (name, *(f"{took[key]:.1f}" for key in ("p50_ms", "p99_ms", "max_ms")), str(took["count"]))
+        (name, *(f"{took[key]:.1f}" for key in ("p50_ms", "p99_ms", "max_ms")), str(took["timed"]))
         for name, took in bench["figures"]["nodes"]["decision"].items()
     ]
     return table(("policy", "p50 [ms]", "p99", "longest", "decisions"), rows)

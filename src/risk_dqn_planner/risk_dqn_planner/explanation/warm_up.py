@@ -12,6 +12,7 @@ from risk_dqn_planner.explanation.answer import NOBODY, Pair
 from risk_dqn_planner.policies.base import Action
 from risk_dqn_planner.policies.rule_based import RuleBasedConfig
 from risk_dqn_planner.safety.assumptions import SafetyAssumptions
+from risk_dqn_planner.safety.course import GO
 from risk_dqn_planner.situation.warm_up import example_situation
 
 
@@ -33,7 +34,7 @@ def warm_up(config: RuleBasedConfig, assumptions: SafetyAssumptions) -> None:
         for whom in (seen, hidden):
             timing.arrival_time(crossing, whom, by)
             timing.distance_and_speed(crossing, whom, by)
-        for periods in (timing.GO, 1):
+        for periods in (GO, 1):
             timing.leave_time(crossing, 0, Action.FAST, by, periods)
         timing.nearest(crossing, Action.FAST, by)
         timing.ahead_of_ego(joined, seen)

@@ -33,7 +33,7 @@ _WARM_UP = 10
 _FIRST_FAULT = 20  # reasons from here on are faults, see Decision.msg
 _NOTICE_S = 0.03  # the node has seen the clock by then
 _ANSWER_S = 0.5
-_LOST = 0.05  # share of the clock's messages, which are best effort, that may be lost
+_LOST = 0.5  # share of decisions that may be lost: a busy computer loses messages of the clock
 
 
 def situations(model: IntersectionModel, objects: int, count: int) -> list[bytes]:

@@ -34,6 +34,7 @@ PERIOD_S = 0.1
 DECISION_PERIOD_S = 0.5
 START_S = 240.0
 SETTLE_S = 5.0
+LOAD_SETTLES_S = 1.0
 _FIRST_FAULT = 20  # reasons from here on are faults, see Decision.msg
 
 
@@ -123,12 +124,13 @@ def drive(
             with bound_to(cores.nodes):
                 nodes = running.enter_context(group)
             situations, decisions = Ear(node, topics.SITUATION), Ear(node, topics.DECISION)
-            scene = MovingScene(model, objects, duration_s + SETTLE_S, seed=1)
+            scene = MovingScene(model, objects, duration_s + SETTLE_S + LOAD_SETTLES_S, seed=1)
             wait_until(lambda: _is_loaded(decisions), "the policy", START_S, nodes.check)
             sender = Sender(node, scene, model.route)
+            _play(sender, situations, SETTLE_S)
+            _require_decisions(decisions)
             with busy_loops(cores.busy), undisturbed():
-                _play(sender, situations, SETTLE_S)
-                _require_decisions(decisions)
+                _play(sender, situations, LOAD_SETTLES_S)
                 for heard in (sender.sent_s, situations, decisions):
                     heard.clear()
                 before_s = _computed_s(nodes)

@@ -98,6 +98,10 @@ ship: ## ship a trained run, without RUN only write the cards [RUN=out/training/
 bench: ## measure all beside highway-env, libsumo and stable-baselines3 [ARGS='--quick']
 	@$(WITH_ROS) python tools/peers.py -- python -m bench $(ARGS)
 
+.PHONY: faults
+faults: ## measure how the planner reacts to faults, for docs/faults.md [ARGS='--phases 1']
+	@$(WITH_ROS) python tests/fault_table.py --out docs/faults.md $(ARGS)
+
 .PHONY: story
 story: ## tell when and why decisions changed: BAG=bags/... [TOPIC PICTURE=story.png ARGS=--all]
 	@$(if $(BAG),,echo 'error: say which bag, for example make story BAG=bags/four_way' >&2; exit 2)

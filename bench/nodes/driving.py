@@ -33,7 +33,7 @@ from sim_bridge.ros.soak.processes import computed_s
 PERIOD_S = 0.1
 DECISION_PERIOD_S = 0.5
 START_S = 240.0
-SETTLE_S = 5.0
+SETTLE_S = 60.0  # at most
 LOAD_SETTLES_S = 1.0
 _FIRST_FAULT = 20  # reasons from here on are faults, see Decision.msg
 
@@ -127,8 +127,7 @@ def drive(
             scene = MovingScene(model, objects, duration_s + SETTLE_S + LOAD_SETTLES_S, seed=1)
             wait_until(lambda: _is_loaded(decisions), "the policy", START_S, nodes.check)
             sender = Sender(node, scene, model.route)
-            _play(sender, situations, SETTLE_S)
-            _require_decisions(decisions)
+            _settle(sender, situations, decisions, nodes)
             with busy_loops(cores.busy), undisturbed():
                 _play(sender, situations, LOAD_SETTLES_S)
                 for heard in (sender.sent_s, situations, decisions):
@@ -151,10 +150,15 @@ def _is_loaded(decisions: Ear) -> bool:
     return decision is not None and decision.reason != Decision.POLICY_NOT_READY
 
 
-def _require_decisions(decisions: Ear) -> None:
-    decision: Decision = decisions.newest()
-    if decision.reason >= _FIRST_FAULT:
-        raise SilentPlannerError(f"the planner does not decide on the traffic: {decision.text}")
+def _settle(sender: Sender, situations: Ear, decisions: Ear, nodes: NodeGroup) -> None:
+    """Play until decisions are the policy's own."""
+    for _ in range(round(SETTLE_S)):
+        _play(sender, situations, 1.0)
+        nodes.check()
+        decision: Decision = decisions.newest()
+        if decision.reason < _FIRST_FAULT:
+            return
+    raise SilentPlannerError(f"the planner does not decide on the traffic: {decision.text}")
 
 
 def _play(sender: Sender, situations: Ear, duration_s: float) -> None:

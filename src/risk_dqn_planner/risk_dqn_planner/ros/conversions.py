@@ -34,6 +34,7 @@ from risk_dqn_planner.situation.report import SituationReport
 from risk_dqn_planner.situation.situations import Floats, Situations, empty_situations
 
 SECOND_NS = 1_000_000_000
+_FIRST_NS, _LAST_NS = -(2**31) * SECOND_NS, 2**31 * SECOND_NS - 1
 # Orientations of drivers and simulators are normalised; an unset one has norm 0.
 _QUATERNION_NORM_TOLERANCE = 0.1
 
@@ -44,8 +45,11 @@ def to_ns(stamp: Time) -> int:
 
 
 def to_stamp(time_ns: int) -> Time:
-    """Return nanoseconds as a stamp."""
-    seconds, nanoseconds = divmod(time_ns, SECOND_NS)
+    """Return nanoseconds as a stamp, the nearest there is.
+
+    Stamps that come in may hold billions of nanoseconds on top of the last second there is.
+    """
+    seconds, nanoseconds = divmod(min(max(time_ns, _FIRST_NS), _LAST_NS), SECOND_NS)
     return Time(sec=seconds, nanosec=nanoseconds)
 
 

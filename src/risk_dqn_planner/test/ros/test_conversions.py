@@ -7,6 +7,7 @@ from enum import IntEnum
 
 import numpy as np
 import pytest
+from builtin_interfaces.msg import Time
 from hypothesis import given
 from hypothesis import strategies as st
 from intersection_msgs.msg import Decision as DecisionMessage
@@ -60,6 +61,14 @@ DECISION = Decision(
 @given(st.integers(0, 2**31 * 10**9 - 1))
 def test_stamps_keep_every_nanosecond(time_ns: int) -> None:
     assert conversions.to_ns(conversions.to_stamp(time_ns)) == time_ns
+
+
+def test_stamps_that_no_clock_shows_become_the_nearest_there_is() -> None:
+    latest = Time(sec=2**31 - 1, nanosec=2**32 - 1)
+    assert conversions.to_stamp(conversions.to_ns(latest)) == Time(
+        sec=2**31 - 1, nanosec=999_999_999
+    )
+    assert conversions.to_stamp(-(10**20)) == Time(sec=-(2**31), nanosec=0)
 
 
 @pytest.mark.parametrize(("seconds", "parts"), [(1.25, (1, 250_000_000)), (0.3, (0, 300_000_000))])

@@ -5,7 +5,7 @@ import copy
 
 import numpy as np
 import torch
-from torch.nn.utils import parameters_to_vector
+from torch.nn.utils import parameters_to_vector, vector_to_parameters
 
 from bench.options import Effort
 from bench.report import Section
@@ -13,7 +13,7 @@ from bench.timing import in_turns, repeat_for
 from risk_dqn_planner.policies.network import RiskDqn
 from risk_dqn_planner.state.encoding import COLUMNS, ROWS, SCENES
 from sim_bridge.learning.config import LearnerConfig
-from sim_bridge.learning.export import initial_weights, network_of
+from sim_bridge.learning.export import initial_weights
 from sim_bridge.learning.learner import Learner
 from sim_bridge.learning.presets import preset_named
 from sim_bridge.learning.replay import Sample, Transitions
@@ -88,7 +88,9 @@ def compare(preset: str, effort: Effort) -> dict[str, float]:
     config = preset_named(preset)
     weights, sample = initial_weights(0), random_sample(config.batch_size)
     ours = Learner(config.learner, weights)
-    theirs = TorchLearner(config.learner, network_of(weights), sample)
+    network = RiskDqn()
+    vector_to_parameters(torch.from_numpy(weights.copy()), network.parameters())
+    theirs = TorchLearner(config.learner, network, sample)
     for _ in range(3):
         ours.update(sample, 0.0)
         theirs.update()

@@ -40,7 +40,7 @@ from risk_dqn_planner.ros.parameters import (
     add_assumptions,
     read_assumptions,
 )
-from risk_dqn_planner.ros.qos import NEWEST
+from risk_dqn_planner.ros.qos import EACH
 from risk_dqn_planner.ros.ticker import Ticker
 from risk_dqn_planner.safety.assumptions import SafetyAssumptions
 from risk_dqn_planner.situation.report import SituationReport
@@ -66,7 +66,7 @@ class PolicyNode(ManagedNode):
         self._decider = self._undecided(Reason.POLICY_NOT_READY, "is still being loaded")
         self._ticker = Ticker(self, self)
         self._clock_back = on_clock_back(self, lambda: self._decider.clock_went_back(now_ns(self)))
-        self.create_subscription(Situation, "~/input/situation", self._on_situation, NEWEST)
+        self.create_subscription(Situation, "~/input/situation", self._on_situation, EACH)
         if self.autostart:
             self._tick()
 

@@ -11,7 +11,7 @@ from risk_dqn_planner.ros import markers
 from risk_dqn_planner.ros.clock import now_ns
 from risk_dqn_planner.ros.conversions import situation_to_message
 from risk_dqn_planner.ros.diagnostics import ERROR, OK, STALE, WARN, Diagnostics, stream_status
-from risk_dqn_planner.ros.qos import NEWEST
+from risk_dqn_planner.ros.qos import EACH, NEWEST
 from risk_dqn_planner.ros.streams import InputRates
 from risk_dqn_planner.ros.synchroniser import Synchroniser
 from risk_dqn_planner.situation.inputs import Perception
@@ -26,7 +26,7 @@ class SituationOutput:
         self._node = node
         self.frame_id = "map"
         self.rates = InputRates()
-        self._publisher = node.create_publisher(Situation, "~/output/situation", NEWEST)
+        self._publisher = node.create_publisher(Situation, "~/output/situation", EACH)
         self._marker_publisher = node.create_publisher(MarkerArray, "~/debug/markers", NEWEST)
         self._diagnostics = Diagnostics(node, "planner")
         self._told: tuple[Status, object] | None = None

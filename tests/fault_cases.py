@@ -273,7 +273,7 @@ def _of_situation() -> list[Case]:
         case("a lane twice", lane_twice, malformed),
         case("1 s ahead", partial(moved_in_time, by_s=1.0), Reason.FUTURE_INPUT,
              passing=(Told(Reason.OUT_OF_ORDER_INPUT, SITUATION),)),
-        case("1 s old", partial(moved_in_time, by_s=-1.0), Reason.OUT_OF_ORDER_INPUT,
+        case("back by 0.3 s", partial(moved_in_time, by_s=-0.3), Reason.OUT_OF_ORDER_INPUT,
              passing=(_stale(SITUATION),)),
     ]  # fmt: skip
 

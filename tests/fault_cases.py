@@ -85,6 +85,8 @@ class Case:
 
     told: what decisions settle on, None where the planner must drive on. passing: what they may
     say before. frames: how many are disturbed at least. level: of the input's diagnostics.
+    steady: what is told last while it lasts must be `told`; not so where good and bad messages
+    alternate.
     """
 
     name: str
@@ -96,6 +98,7 @@ class Case:
     recovery_s: float = RECOVERY_S
     frames: int = LASTS_FRAMES
     level: bytes | None = None
+    steady: bool = True
 
     @property
     def title(self) -> str:
@@ -272,9 +275,9 @@ def _of_situation() -> list[Case]:
              partial(with_field, path="vehicles.0.lane_id", value=424242), malformed),
         case("a lane twice", lane_twice, malformed),
         case("1 s ahead", partial(moved_in_time, by_s=1.0), Reason.FUTURE_INPUT,
-             passing=(Told(Reason.OUT_OF_ORDER_INPUT, SITUATION),)),
+             steady=False, passing=(Told(Reason.OUT_OF_ORDER_INPUT, SITUATION),)),
         case("back by 0.3 s", partial(moved_in_time, by_s=-0.3), Reason.OUT_OF_ORDER_INPUT,
-             passing=(_stale(SITUATION),)),
+             steady=False, passing=(_stale(SITUATION),)),
     ]  # fmt: skip
 
 

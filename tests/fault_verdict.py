@@ -29,7 +29,7 @@ def complaints(case: Case, reaction: Reaction) -> list[str]:
     expected = {case.told, *case.passing}
     said = [told_by(d) for d in during[first:]]
     found += [f"said {one} in passing" for one in said if one not in expected]
-    if case.frames > 1 and said and said[-1] != case.told:
+    if case.steady and case.frames > 1 and said and said[-1] != case.told:
         found.append(f"settled on {said[-1]}, expected {case.told}")
     later = [told_by(d) for d in after if d.reason not in (Decision.FIXED, Decision.RECOVERING)]
     found += [f"said {one} afterwards" for one in later if one not in expected]

@@ -7,8 +7,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import settings
 
 from risk_dqn_planner.situation.situations import Situations, empty_situations
+
+# The first example of a test may wait for the compiler, and any for a busy computer.
+settings.register_profile("compiled", deadline=None)
+settings.load_profile("compiled")
 
 
 @dataclass(frozen=True)

@@ -180,7 +180,8 @@ def test_nothing_is_taken_for_seen_unless_the_user_says_so(tmp_path: Path) -> No
 
 
 def with_broken_orientation(message: Message) -> Message:
-    message.objects[0].kinematics.pose_with_covariance.pose.orientation.w = 7.0
+    for each in message.objects:  # none as long as nobody is in sight
+        each.kinematics.pose_with_covariance.pose.orientation.w = 7.0
     return message
 
 

@@ -41,13 +41,21 @@ def convert(
     is taken, without a visible area all within `visible_range_m` of the ego counts as seen.
 
     Raises:
-        BagError: the source cannot be used, the target exists, or nothing says what was seen.
+        BagError: the source cannot be used, the target exists, nothing says what was seen, or a
+            topic is named twice.
     """
     if VISIBLE_AREA.name not in names and visible_range_m is None:
         raise BagError(
             f"{source}: nothing says what the sensors saw, expected a topic with the visible area, "
             "or how far the ego sees in all directions"
         )
+    for name in names.values():
+        inputs = [own.strip("/") for own, given in names.items() if given == name]
+        if len(inputs) > 1:
+            raise BagError(
+                f"{source}: {name} in two places, as {' and as '.join(inputs)}, "
+                "expected a topic of its own for each"
+            )
     topics = [topic for topic in INPUTS if topic.name in names]
     bag = read_bag(source, topics, adapters, names)
     messages = [

@@ -18,7 +18,7 @@ from risk_dqn_planner.policies.fastest_sound import assumptions_of, sound_decisi
 from risk_dqn_planner.policies.fingerprint import fingerprint
 from risk_dqn_planner.policies.foresight.search import search_into
 from risk_dqn_planner.policies.foresight.sight import SightLines
-from risk_dqn_planner.policies.foresight.task import SearchNumbers, work_for
+from risk_dqn_planner.policies.foresight.task import SearchNumbers, work_fit_for, work_for
 from risk_dqn_planner.policies.rule_based import RuleBasedConfig
 from risk_dqn_planner.safety.assumptions import SafetyAssumptions
 from risk_dqn_planner.safety.guard import Guard
@@ -167,13 +167,14 @@ class LookAheadPolicy:
     def decide(self, situations: Situations, restart: Booleans) -> Decisions:
         """Decide for each situation; what vindicates the decision is remembered."""
         check = self._guard.look(situations, restart)
-        self._fit(situations)
+        p, c = self.assumptions.numbers(), self.config.numbers()
+        self._work = work_fit_for(self._work, c, p, situations)
         action = np.empty(len(restart), dtype=np.int64)
         critical = np.empty((len(restart), 2), dtype=np.int64)
         search_into(
             situations,
-            self.assumptions.numbers(),
-            self.config.numbers(),
+            p,
+            c,
             self._guard.reacted_m,
             self._sight.corner_m(situations, restart),
             self._guard.sound(check),
@@ -189,10 +190,3 @@ class LookAheadPolicy:
         vehicle = np.where(keeps, critical[:, 0], vehicle)
         lane = np.where(keeps, critical[:, 1], lane)
         return sound_decisions(self._guard, check, action, vehicle, lane, lacking_s)
-
-    def _fit(self, situations: Situations) -> None:
-        """Have room for situations of their shape."""
-        wanted = situations.vehicle_mask.shape[1], situations.lane_mask.shape[1]
-        ahead = self._work.ahead
-        if wanted != (ahead.vehicle_mask.shape[1], ahead.lane_mask.shape[1]):
-            self._work = work_for(self.config.numbers(), self.assumptions.numbers(), *wanted)

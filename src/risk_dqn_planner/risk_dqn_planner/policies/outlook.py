@@ -22,7 +22,13 @@ from risk_dqn_planner.compiled import kernel
 from risk_dqn_planner.errors import ConfigurationError
 from risk_dqn_planner.policies.foresight.forecast import WAYS_TO_WAIT, Place, forecast, next_place
 from risk_dqn_planner.policies.foresight.sight import SightLines
-from risk_dqn_planner.policies.foresight.task import SearchNumbers, Task, Work, work_for
+from risk_dqn_planner.policies.foresight.task import (
+    SearchNumbers,
+    Task,
+    Work,
+    work_fit_for,
+    work_for,
+)
 from risk_dqn_planner.safety.assumptions import SafetyAssumptions, SafetyNumbers
 from risk_dqn_planner.safety.course import begin_course
 from risk_dqn_planner.safety.guard import Guard
@@ -98,7 +104,7 @@ class Outlook:
         self.config = config or OutlookConfig()
         self._guard = Guard(assumptions)
         self._sight = SightLines(self.config.nearest_corner_m)
-        self._work = self._room(0, 0)
+        self._work = work_for(_numbers(self.config), self.assumptions.numbers(), 0, 0)
 
     @property
     def assumptions(self) -> SafetyAssumptions:
@@ -108,10 +114,8 @@ class Outlook:
     def look(self, situations: Situations, restart: Booleans) -> Views:
         """Look at B situations; `restart` (B,) marks where what was seen before is void."""
         check = self._guard.look(situations, restart)
-        ahead = self._work.ahead
-        shape = situations.vehicle_mask.shape[1], situations.lane_mask.shape[1]
-        if shape != (ahead.vehicle_mask.shape[1], ahead.lane_mask.shape[1]):
-            self._work = self._room(*shape)
+        p, c = self.assumptions.numbers(), _numbers(self.config)
+        self._work = work_fit_for(self._work, c, p, situations)
         views = Views(
             inputs=np.empty((len(restart), self.config.size), dtype=np.float32),
             sound=self._guard.sound(check),
@@ -122,8 +126,8 @@ class Outlook:
         )
         look_into(
             situations,
-            self.assumptions.numbers(),
-            _numbers(self.config),
+            p,
+            c,
             self.config.most_s,
             self.config.most_m,
             views.reacted_m,
@@ -138,9 +142,6 @@ class Outlook:
     def decided(self, views: Views, action: Integers) -> None:
         """Take note of the actions (B,) that will be carried out."""
         self._guard.decided(views.check, action)
-
-    def _room(self, vehicles: int, lanes: int) -> Work:
-        return work_for(_numbers(self.config), self.assumptions.numbers(), vehicles, lanes)
 
 
 def _numbers(config: OutlookConfig) -> SearchNumbers:

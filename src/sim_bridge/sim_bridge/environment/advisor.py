@@ -4,7 +4,7 @@
 import numpy as np
 
 from risk_dqn_planner.policies.foresight.search import search_into
-from risk_dqn_planner.policies.foresight.task import Work, work_for
+from risk_dqn_planner.policies.foresight.task import Work, work_fit_for, work_for
 from risk_dqn_planner.policies.look_ahead import LookAheadConfig
 from risk_dqn_planner.policies.outlook import Views
 from risk_dqn_planner.safety.assumptions import SafetyAssumptions
@@ -21,10 +21,8 @@ class Advisor:
 
     def best_actions(self, situations: Situations, views: Views) -> Integers:
         """Return the first action (B,) of the best plan that is found for each situation."""
-        batch, vehicles = situations.vehicle_mask.shape
-        ahead, lanes = self._work.ahead, situations.lane_mask.shape[1]
-        if (vehicles, lanes) != (ahead.vehicle_mask.shape[1], ahead.lane_mask.shape[1]):
-            self._work = work_for(self._config, self._assumptions, vehicles, lanes)
+        batch = len(situations.ego_speed_mps)
+        self._work = work_fit_for(self._work, self._config, self._assumptions, situations)
         action = np.empty(batch, dtype=np.int64)
         search_into(
             situations,

@@ -149,3 +149,11 @@ def work_for(c: SearchNumbers, p: SafetyNumbers, vehicles: int, lanes: int) -> W
         cells=Cells(np.empty(cells, dtype=np.int64), np.empty(cells, dtype=np.int64)),
         best=Best(np.empty(1), np.empty(1, dtype=np.int64), np.empty(2, dtype=np.int64)),
     )
+
+
+def work_fit_for(w: Work, c: SearchNumbers, p: SafetyNumbers, situations: Situations) -> Work:
+    """Return `w`, or new room if it is not of the situations' shape."""
+    vehicles, lanes = situations.vehicle_mask.shape[1], situations.lane_mask.shape[1]
+    if (vehicles, lanes) == (w.ahead.vehicle_mask.shape[1], w.ahead.lane_mask.shape[1]):
+        return w
+    return work_for(c, p, vehicles, lanes)

@@ -8,6 +8,8 @@ optimiser (Adam), exploration, exponents of the prioritised replay, when learnin
 are the defaults of config.py.
 """
 
+from dataclasses import replace
+
 from risk_dqn_planner.errors import ConfigurationError
 from sim_bridge.learning.config import (
     AdviceConfig,
@@ -16,6 +18,42 @@ from sim_bridge.learning.config import (
     LearnerConfig,
     ReplayConfig,
     TrainingConfig,
+)
+
+# Under the supervisor collisions are out of the question, so there is time to try things.
+_SUPERVISED = TrainingConfig(
+    preset="supervised",
+    steps=1_500_000,
+    environments=64,
+    updates_per_step=2,
+    batch_size=256,
+    warmup_steps=5_000,
+    gamma=0.99,
+    n_step=5,
+    replay=ReplayConfig(capacity=200_000),
+    exploration=ExplorationConfig(start=1.0, end=0.02, share=0.4, repeat=0.8),
+    learner=LearnerConfig(
+        learning_rate=1e-3,
+        learning_rate_end=3e-5,
+        target_rate=0.01,
+        max_gradient_norm=10.0,
+    ),
+    evaluation=EvaluationConfig(
+        every_episodes=2_000, episodes=20, validation_every=3, validation_episodes=2_000
+    ),
+)
+# The expert knows the way: little is left to be explored.
+_ADVISED = replace(
+    _SUPERVISED,
+    preset="advised",
+    environments=128,
+    updates_per_step=4,
+    exploration=ExplorationConfig(start=0.05, end=0.01, share=0.5),
+    evaluation=EvaluationConfig(
+        every_episodes=4_000, episodes=20, validation_every=2, validation_episodes=2_000
+    ),
+    outlook=True,
+    advice=AdviceConfig(),
 )
 
 PRESETS = {
@@ -52,52 +90,8 @@ PRESETS = {
             every_episodes=1_000, episodes=20, validation_every=2, validation_episodes=2_000
         ),
     ),
-    # Under the supervisor collisions are out of the question, so there is time to try things.
-    "supervised": TrainingConfig(
-        preset="supervised",
-        steps=1_500_000,
-        environments=64,
-        updates_per_step=2,
-        batch_size=256,
-        warmup_steps=5_000,
-        gamma=0.99,
-        n_step=5,
-        replay=ReplayConfig(capacity=200_000),
-        exploration=ExplorationConfig(start=1.0, end=0.02, share=0.4, repeat=0.8),
-        learner=LearnerConfig(
-            learning_rate=1e-3,
-            learning_rate_end=3e-5,
-            target_rate=0.01,
-            max_gradient_norm=10.0,
-        ),
-        evaluation=EvaluationConfig(
-            every_episodes=2_000, episodes=20, validation_every=3, validation_episodes=2_000
-        ),
-    ),
-    # The expert knows the way: little is left to be explored.
-    "advised": TrainingConfig(
-        preset="advised",
-        steps=1_500_000,
-        environments=128,
-        updates_per_step=4,
-        batch_size=256,
-        warmup_steps=5_000,
-        gamma=0.99,
-        n_step=5,
-        replay=ReplayConfig(capacity=200_000),
-        exploration=ExplorationConfig(start=0.05, end=0.01, share=0.5),
-        learner=LearnerConfig(
-            learning_rate=1e-3,
-            learning_rate_end=3e-5,
-            target_rate=0.01,
-            max_gradient_norm=10.0,
-        ),
-        evaluation=EvaluationConfig(
-            every_episodes=4_000, episodes=20, validation_every=2, validation_episodes=2_000
-        ),
-        outlook=True,
-        advice=AdviceConfig(),
-    ),
+    "supervised": _SUPERVISED,
+    "advised": _ADVISED,
 }
 
 

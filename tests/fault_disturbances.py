@@ -11,7 +11,8 @@ from geometry_msgs.msg import Point32
 from intersection_msgs.msg import PerceivedObject
 
 from risk_dqn_planner.intersection.model import IntersectionModel
-from risk_dqn_planner.ros.conversions import SECOND_NS, to_stamp
+from risk_dqn_planner.ros.conversions import to_stamp
+from risk_dqn_planner.ros.streams import SECOND_NS
 
 Message: TypeAlias = Any  # of whichever type
 

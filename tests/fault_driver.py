@@ -30,8 +30,9 @@ from risk_dqn_planner.intersection.builder import build_intersection
 from risk_dqn_planner.intersection.model import IntersectionModel
 from risk_dqn_planner.map.loader import load_map
 from risk_dqn_planner.ros import conversions
-from risk_dqn_planner.ros.conversions import SECOND_NS, to_ns, to_stamp
+from risk_dqn_planner.ros.conversions import to_ns, to_stamp
 from risk_dqn_planner.ros.qos import DIAGNOSTICS
+from risk_dqn_planner.ros.streams import SECOND_NS
 from risk_dqn_planner.situation.report import FaultyInput
 from sim_bridge.ros import topics
 from sim_bridge.ros.process import ParameterValue

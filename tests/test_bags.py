@@ -20,7 +20,8 @@ from rclpy.serialization import deserialize_message, serialize_message
 from rosbags.highlevel import AnyReader
 from rosbags.rosbag2 import Reader
 
-from risk_dqn_planner.ros.conversions import SECOND_NS, ego_from_message
+from risk_dqn_planner.ros.conversions import ego_from_message
+from risk_dqn_planner.ros.streams import SECOND_NS
 from sim_bridge.maps import map_names
 from sim_bridge.ros import topics
 from sim_bridge.ros.bag_plan import bags

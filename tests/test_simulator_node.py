@@ -10,7 +10,8 @@ from intersection_msgs.srv import ResetEpisode
 from rclpy.node import Node
 from rosgraph_msgs.msg import Clock
 
-from risk_dqn_planner.ros.conversions import SECOND_NS, header, to_ns
+from risk_dqn_planner.ros.conversions import header, to_ns
+from risk_dqn_planner.ros.streams import SECOND_NS
 from sim_bridge.ros import topics
 from sim_bridge.ros.node_group import NodeGroup
 from sim_bridge.ros.run_settings import RunSettings

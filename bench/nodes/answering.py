@@ -21,6 +21,7 @@ from bench.nodes.listening import Ear, Spread, spread, undisturbed
 from bench.nodes.scene import MovingScene
 from risk_dqn_planner.intersection.model import IntersectionModel
 from risk_dqn_planner.ros import conversions
+from risk_dqn_planner.ros.streams import SECOND_NS
 from risk_dqn_planner.situation.pipeline import SituationPipeline
 from sim_bridge.ros import topics
 from sim_bridge.ros.node_group import NodeGroup
@@ -42,7 +43,7 @@ def situations(model: IntersectionModel, objects: int, count: int) -> list[bytes
     Raises:
         SystemExit: the scene is refused, which is a mistake of the benchmark's own.
     """
-    period_s = DECISION_PERIOD_NS / conversions.SECOND_NS
+    period_s = DECISION_PERIOD_NS / SECOND_NS
     scene = MovingScene(model, objects, count * period_s, seed=1)
     pipeline = SituationPipeline(lambda _route: model)
     pipeline.select(model.route)
@@ -62,7 +63,7 @@ def situations(model: IntersectionModel, objects: int, count: int) -> list[bytes
 def restamped(situation: bytes, stamp_ns: int) -> bytes:
     """Return a serialised message, whose first field is a header, with another stamp."""
     order = "<" if situation[1] & 1 else ">"
-    stamp = struct.pack(f"{order}iI", *divmod(stamp_ns, conversions.SECOND_NS))
+    stamp = struct.pack(f"{order}iI", *divmod(stamp_ns, SECOND_NS))
     return situation[:4] + stamp + situation[12:]
 
 

@@ -29,11 +29,11 @@ from risk_dqn_planner.errors import InputError
 from risk_dqn_planner.faults import FaultyInput, Status
 from risk_dqn_planner.policies.base import Supervision
 from risk_dqn_planner.ros.explanations import explanation_from_message, explanation_to_message
+from risk_dqn_planner.ros.streams import SECOND_NS
 from risk_dqn_planner.situation.inputs import EgoPose, ObjectArrays, Perception
 from risk_dqn_planner.situation.report import SituationReport
 from risk_dqn_planner.situation.situations import Floats, Situations, empty_situations
 
-SECOND_NS = 1_000_000_000
 _FIRST_NS, _LAST_NS = -(2**31) * SECOND_NS, 2**31 * SECOND_NS - 1
 # Orientations of drivers and simulators are normalised; an unset one has norm 0.
 _QUATERNION_NORM_TOLERANCE = 0.1

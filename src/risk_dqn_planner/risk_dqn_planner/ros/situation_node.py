@@ -30,7 +30,7 @@ from risk_dqn_planner.ros.main import run_managed
 from risk_dqn_planner.ros.parameters import ClockParameters, EgoParameters, MapParameters
 from risk_dqn_planner.ros.qos import LATCHED, NEWEST
 from risk_dqn_planner.ros.situation_output import SituationOutput
-from risk_dqn_planner.ros.streams import AgeLimits, InputRates
+from risk_dqn_planner.ros.streams import SECOND_NS, AgeLimits, InputRates
 from risk_dqn_planner.ros.synchroniser import Frame, Synchroniser, SynchroniserConfig
 from risk_dqn_planner.situation.config import SituationConfig
 from risk_dqn_planner.situation.limits import PlausibilityLimits
@@ -112,7 +112,7 @@ class SituationNode(ManagedNode):
         if is_simulated(self):
             config = replace(config, sync_timeout_s=max(config.sync_timeout_s, patience_s))
         self._synchroniser.reconfigure(config, ages)
-        self._timeout.timer_period_ns = round(1e9 * config.sync_timeout_s)
+        self._timeout.timer_period_ns = round(SECOND_NS * config.sync_timeout_s)
         self._output.rates = self.declared.read(InputRates, _RATES)
         limits = self.declared.read(PlausibilityLimits, _PLAUSIBILITY)
         if self._evaluation is not None:

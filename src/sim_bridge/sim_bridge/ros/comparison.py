@@ -8,7 +8,8 @@ from intersection_msgs.msg import Decision
 from risk_dqn_planner.decision import Action, Reason
 from risk_dqn_planner.faults import FaultyInput
 from risk_dqn_planner.policies.base import Supervision
-from risk_dqn_planner.ros.conversions import SECOND_NS, to_ns
+from risk_dqn_planner.ros.conversions import to_ns
+from risk_dqn_planner.ros.streams import SECOND_NS
 
 NOTHING_IN_TIME = "no decision in time"
 

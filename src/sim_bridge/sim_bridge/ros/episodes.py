@@ -4,7 +4,7 @@
 from collections.abc import Callable
 
 from risk_dqn_planner.decision import Action
-from risk_dqn_planner.ros.conversions import SECOND_NS
+from risk_dqn_planner.ros.streams import SECOND_NS
 from sim_bridge.ros.pacing import Pacing
 from sim_bridge.ros.planner_link import DECISION_PERIOD_NS, EPISODE_GAP_NS
 from sim_bridge.ros.publishing import FramePublisher

@@ -16,7 +16,8 @@ from rosbags.typesys.store import Typestore
 from risk_dqn_planner.errors import BagError, InputError
 from risk_dqn_planner.ros.adapters.config import AdapterConfig
 from risk_dqn_planner.ros.adapters.kinds import CONVERTERS, OWN_TYPE, ObjectsAdapter
-from risk_dqn_planner.ros.conversions import SECOND_NS, objects_to_message, to_ns
+from risk_dqn_planner.ros.conversions import objects_to_message, to_ns
+from risk_dqn_planner.ros.streams import SECOND_NS
 from sim_bridge.ros.foreign_types import FOREIGN_TYPES
 
 

@@ -4,7 +4,7 @@
 from dataclasses import dataclass, field
 
 from risk_dqn_planner.errors import ConfigurationError
-from risk_dqn_planner.ros.conversions import SECOND_NS
+from risk_dqn_planner.ros.streams import SECOND_NS
 from sim_bridge.ros.topics import OBJECTS, ODOMETRY, VISIBLE_AREA
 
 _LOSABLE = tuple(topic.name.strip("/") for topic in (ODOMETRY, VISIBLE_AREA, OBJECTS))

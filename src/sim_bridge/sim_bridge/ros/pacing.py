@@ -13,7 +13,8 @@ from typing import Protocol
 
 from intersection_msgs.msg import Decision
 
-from risk_dqn_planner.ros.conversions import SECOND_NS, to_ns
+from risk_dqn_planner.ros.conversions import to_ns
+from risk_dqn_planner.ros.streams import SECOND_NS
 from sim_bridge.ros.planner_link import DECISION_PERIOD_NS, PlannerLink
 
 # A decision older than this no longer moves the ego when the simulator runs in real time.

@@ -10,7 +10,8 @@ from rclpy.serialization import deserialize_message
 from risk_dqn_planner.decision import Action
 from risk_dqn_planner.intersection.builder import build_intersection
 from risk_dqn_planner.map.loader import load_map
-from risk_dqn_planner.ros.conversions import SECOND_NS, polygon_from_message
+from risk_dqn_planner.ros.conversions import polygon_from_message
+from risk_dqn_planner.ros.streams import SECOND_NS
 from sim_bridge.rendering.frames import Floats, Frame, VehicleFrame
 from sim_bridge.rendering.render import save_episode_picture
 from sim_bridge.ros.drive import DrivenEpisode

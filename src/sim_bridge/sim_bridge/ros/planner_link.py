@@ -11,8 +11,9 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rosgraph_msgs.msg import Clock
 
-from risk_dqn_planner.ros.conversions import SECOND_NS, to_ns, to_stamp
+from risk_dqn_planner.ros.conversions import to_ns, to_stamp
 from risk_dqn_planner.ros.qos import NEWEST
+from risk_dqn_planner.ros.streams import SECOND_NS
 
 DECISION_PERIOD_NS = SECOND_NS // 2
 # Between episodes this much time passes without inputs, so that the planner forgets the last one.

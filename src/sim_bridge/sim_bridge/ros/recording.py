@@ -35,7 +35,7 @@ from rosbags.typesys.store import Typestore
 
 from risk_dqn_planner.errors import BagError
 from risk_dqn_planner.ros.adapters.config import AdapterConfig
-from risk_dqn_planner.ros.conversions import SECOND_NS
+from risk_dqn_planner.ros.streams import SECOND_NS
 from sim_bridge.ros.foreign import ForeignObjects, is_foreign
 from sim_bridge.ros.topics import OBJECTS, Topic
 

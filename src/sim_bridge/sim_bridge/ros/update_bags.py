@@ -16,6 +16,7 @@ from intersection_msgs.msg import Decision
 from rclpy.serialization import deserialize_message, serialize_message
 
 from risk_dqn_planner.errors import BagError, PlannerError
+from risk_dqn_planner.ros.streams import SECOND_NS
 from sim_bridge.ros.expectations import changes, lines_of, log_changes, write_decisions
 from sim_bridge.ros.recording import BagWriter, Stored
 from sim_bridge.ros.replayer import Replayed, replay
@@ -34,7 +35,7 @@ def _taken(found: Replayed) -> list[tuple[int, Decision]]:
     taken = [(stamp_ns, d) for stamp_ns, d in found.decisions.items() if d is not None]
     if len(taken) < len(found.decisions):
         missing = next(stamp_ns for stamp_ns, d in found.decisions.items() if d is None)
-        raise BagError(f"{found.bag.path}: no decision came in time at {missing / 1e9:.1f} s")
+        raise BagError(f"{found.bag.path}: no decision came in time at {missing / SECOND_NS:.1f} s")
     return taken
 
 

@@ -2,7 +2,7 @@
 import pytest
 
 from risk_dqn_planner.errors import ConfigurationError
-from risk_dqn_planner.ros.conversions import SECOND_NS
+from risk_dqn_planner.ros.streams import SECOND_NS
 from sim_bridge.ros.input_loss import InputLoss
 
 

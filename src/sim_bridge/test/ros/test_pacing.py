@@ -5,7 +5,8 @@ import time
 import pytest
 from intersection_msgs.msg import Decision, Situation
 
-from risk_dqn_planner.ros.conversions import SECOND_NS, to_ns, to_stamp
+from risk_dqn_planner.ros.conversions import to_ns, to_stamp
+from risk_dqn_planner.ros.streams import SECOND_NS
 from sim_bridge.ros.pacing import LockStep, RealTime, WallPace
 from sim_bridge.ros.planner_link import DECISION_PERIOD_NS, Mailbox
 

@@ -10,7 +10,7 @@ from collections import Counter
 from dataclasses import dataclass, field
 from itertools import pairwise
 
-SECOND_NS = 1_000_000_000
+from risk_dqn_planner.ros.streams import SECOND_NS
 
 
 @dataclass

@@ -11,7 +11,8 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
 from risk_dqn_planner.policies.base import Reason
-from risk_dqn_planner.ros.conversions import SECOND_NS, to_ns
+from risk_dqn_planner.ros.conversions import to_ns
+from risk_dqn_planner.ros.streams import SECOND_NS
 from sim_bridge.ros.soak.ledger import Ledger
 from sim_bridge.ros.summary import RESULTS
 from sim_bridge.ros.topics import DECISION, EPISODE

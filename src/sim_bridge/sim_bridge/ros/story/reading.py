@@ -21,7 +21,7 @@ from rosbags.typesys.store import Typestore
 
 from risk_dqn_planner.errors import BagError
 from risk_dqn_planner.policies.base import Action
-from risk_dqn_planner.ros.conversions import SECOND_NS
+from risk_dqn_planner.ros.streams import SECOND_NS
 from sim_bridge.ros.recording import installed_types
 
 DECISION = "intersection_msgs/msg/Decision"

@@ -8,7 +8,7 @@ from datetime import datetime, timezone
 from rich.table import Table
 
 from risk_dqn_planner.policies.base import Action
-from risk_dqn_planner.ros.conversions import SECOND_NS
+from risk_dqn_planner.ros.streams import SECOND_NS
 from sim_bridge.ros.story.chapters import Change, Chapter
 
 _COLORS = {Action.STOP: "red", Action.SLOW: "yellow", Action.FAST: "green"}

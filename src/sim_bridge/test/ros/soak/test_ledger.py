@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-from sim_bridge.ros.soak.ledger import SECOND_NS, Ledger
+from risk_dqn_planner.ros.streams import SECOND_NS
+from sim_bridge.ros.soak.ledger import Ledger
 
 HALF_NS = SECOND_NS // 2
 

@@ -98,7 +98,7 @@ def _memory() -> Iterator[SoundnessCell]:
 
 def _frontier() -> Iterator[SoundnessCell]:
     """Where the worst case forbids most; a hidden vehicle that is slower than the truth is risk."""
-    policies = (FASTEST_SOUND, LOOK_AHEAD, SUPERVISED)
+    policies = (FASTEST_SOUND, LOOK_AHEAD, SOUND_DQN)
     for after_s in BRAKES_AFTER_S:
         cell = Cell(OCCLUDED, RESPAWNING, sensor_forward_m=0.0, brakes_for_ego_after_s=after_s)
         for top_mps in HIDDEN_TOP_MPS:

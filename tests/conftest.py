@@ -45,7 +45,7 @@ def planner(
 ) -> Iterator[PlannerDriver]:
     """Situation and policy node with the rule-based policy on the four-way crossing."""
     logs = tmp_path_factory.mktemp("planner")
-    rule_based = replace(settings, policy="rule_based", scenario="demo_light")
+    rule_based = replace(settings, policy="rule_based", scenario="demo_light", supervisor="off")
     commands = rule_based.planner_commands()
     with ros_session("test") as node, NodeGroup(commands, logs) as nodes:
         yield PlannerDriver(node, nodes, model)

@@ -13,9 +13,10 @@ from risk_dqn_planner.errors import PolicyFileError
 FOLDER = "models"
 SUMS = "SHA256SUMS"
 PACKAGE = "risk_dqn_planner"
-# What decides where nobody says which policy shall, and what its supervisor does.
+# What decides where nobody says which policy shall, and what its supervisor does. A policy that is
+# not sound by itself is made so unless the user says otherwise.
 DEFAULT_POLICY = "sound_dqn"
-DEFAULT_SUPERVISOR = "report"
+DEFAULT_SUPERVISOR = "enforce"
 
 
 @dataclass(frozen=True)

@@ -58,7 +58,7 @@ def bags() -> dict[str, PlannedBag]:
     return {
         **maps,
         "default_policy": _bag(
-            "The default policy with its supervisor",
+            "The default policy",
             "four_way", "base", DEFAULT_POLICY, 3, DEFAULT_SUPERVISOR,
         ),
         "dense_traffic": _bag(

@@ -13,17 +13,8 @@ class ConstantPolicy:
 
     def __init__(self, action: Action) -> None:
         self.action = action
-        self._hash = fingerprint({"policy": self.name})
-
-    @property
-    def name(self) -> str:
-        """always_stop, always_slow or always_fast."""
-        return f"always_{self.action.name.lower()}"
-
-    @property
-    def hash(self) -> str:
-        """SHA-256 of the name."""
-        return self._hash
+        self.name = f"always_{action.name.lower()}"
+        self.hash = fingerprint({"policy": self.name})
 
     def decide(self, situations: Situations, restart: Booleans) -> Decisions:  # noqa: ARG002
         """Decide the same for each situation; risks are not looked at."""

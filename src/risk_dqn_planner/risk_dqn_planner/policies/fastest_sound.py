@@ -28,11 +28,12 @@ def assumptions_of(config: RuleBasedConfig) -> SafetyAssumptions:
 class FastestSoundPolicy:
     """The fastest admissible action; where there is none, the manoeuvre verified last."""
 
+    name = "fastest_sound"
     chooses_sound = True
 
     def __init__(self, assumptions: SafetyAssumptions | None = None) -> None:
         self._guard = Guard(assumptions)
-        self._hash = fingerprint({"policy": self.name} | dataclasses.asdict(self.assumptions))
+        self.hash = fingerprint({"policy": self.name} | dataclasses.asdict(self.assumptions))
 
     @classmethod
     def from_config(cls, config: RuleBasedConfig) -> "FastestSoundPolicy":
@@ -43,16 +44,6 @@ class FastestSoundPolicy:
     def assumptions(self) -> SafetyAssumptions:
         """What its soundness rests on."""
         return self._guard.assumptions
-
-    @property
-    def name(self) -> str:
-        """Name for logs and messages."""
-        return "fastest_sound"
-
-    @property
-    def hash(self) -> str:
-        """SHA-256 of the assumptions."""
-        return self._hash
 
     def decide(self, situations: Situations, restart: Booleans) -> Decisions:
         """Decide for each situation; the manoeuvre that vindicates the decision is remembered."""

@@ -29,20 +29,9 @@ class LearnedPolicy:
         foresight: RuleBasedConfig | None = None,
     ) -> None:
         self.network = network
-        self._name = name
-        self._hash = sha256
+        self.name, self.hash = name, sha256
         self._encoder = StateEncoder(state)
         self._foresight = foresight or RuleBasedConfig()
-
-    @property
-    def name(self) -> str:
-        """Name that the policy was given when it was trained."""
-        return self._name
-
-    @property
-    def hash(self) -> str:
-        """SHA-256 of the policy's file."""
-        return self._hash
 
     def decide(self, situations: Situations, restart: Booleans) -> Decisions:
         """Decide for each situation and remember it.

@@ -54,19 +54,11 @@ class RuleBasedPolicy:
     and every virtual vehicle R_CSS or R_CSL is 0 in the predicted situation, R_risk = 0.
     """
 
+    name = "rule_based"
+
     def __init__(self, config: RuleBasedConfig | None = None) -> None:
         self.config = config or RuleBasedConfig()
-        self._hash = fingerprint({"policy": self.name} | dataclasses.asdict(self.config))
-
-    @property
-    def name(self) -> str:
-        """Name for logs and messages."""
-        return "rule_based"
-
-    @property
-    def hash(self) -> str:
-        """SHA-256 of the configuration."""
-        return self._hash
+        self.hash = fingerprint({"policy": self.name} | dataclasses.asdict(self.config))
 
     def decide(self, situations: Situations, restart: Booleans) -> Decisions:  # noqa: ARG002
         """Decide for each situation; nothing is remembered."""

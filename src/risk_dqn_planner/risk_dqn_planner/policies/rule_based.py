@@ -15,18 +15,13 @@ from risk_dqn_planner.situation.situations import Booleans, Floats, Integers, Si
 
 @dataclass(frozen=True)
 class RuleBasedConfig:
-    """How far Algorithm 1 looks ahead, 4 times 0.5 s, and what it holds for safe."""
+    """How far Algorithm 1 looks ahead, and what it holds for safe.
 
-    prediction_steps: int = field(
-        default=4,
-        metadata={"description": "Decision periods that the worst case is predicted over",
-                  "minimum": 1, "maximum": 20},
-    )  # fmt: skip
-    decision_period_s: float = field(
-        default=0.5,
-        metadata={"description": "Time from one decision to the next [s]",
-                  "minimum": 0.05, "maximum": 5.0},
-    )  # fmt: skip
+    prediction_steps: decision periods that the worst case is predicted over.
+    """
+
+    prediction_steps: int = 4
+    decision_period_s: float = 0.5
     risk: RiskConfig = field(default_factory=RiskConfig)
 
     def __post_init__(self) -> None:

@@ -31,31 +31,16 @@ class RiskConfig:
     """What counts as safe.
 
     ego: a_max^e, a_brake, and v_max (its fast speed). traffic: a_max^i.
-    stop_margin_m: d_safe is half the zone plus this. desired_gap_s, safe_gap_s: t_des, t_safe.
+    stop_margin_m: d_safe is half the zone plus this. desired_gap_s: t_des, time behind the ego from
+    which on all is safe. safe_gap_s: t_safe, below which all is lost.
     vehicle, leader_margin_m: merging lanes only, where a vehicle that has joined is a leader:
     the length of both footprints, and what must stay between them at rest.
     """
 
-    stop_margin_m: float = field(
-        default=0.1,
-        metadata={"description": "Room to leave before a conflict zone at rest [m]",
-                  "minimum": 0.0, "maximum": 20.0},
-    )  # fmt: skip
-    desired_gap_s: float = field(
-        default=3.0,
-        metadata={"description": "Time gap behind the ego that counts as fully safe, t_des [s]",
-                  "minimum": 0.0, "maximum": 30.0},
-    )  # fmt: skip
-    safe_gap_s: float = field(
-        default=0.1,
-        metadata={"description": "Time gap below which all is lost, t_safe [s]",
-                  "minimum": 0.0, "maximum": 30.0},
-    )  # fmt: skip
-    leader_margin_m: float = field(
-        default=1.0,
-        metadata={"description": "Room to leave behind a leader's footprint at rest [m]",
-                  "minimum": 0.0, "maximum": 50.0},
-    )  # fmt: skip
+    stop_margin_m: float = 0.1
+    desired_gap_s: float = 3.0
+    safe_gap_s: float = 0.1
+    leader_margin_m: float = 1.0
     ego: EgoLimits = field(default_factory=EgoLimits)
     traffic: TrafficLimits = field(default_factory=TrafficLimits)
     vehicle: VehicleDimensions = field(default_factory=VehicleDimensions)

@@ -6,7 +6,7 @@ import numpy as np
 from risk_dqn_planner.compiled import kernel
 from risk_dqn_planner.geometry.polyline import segment_index_kernel
 from risk_dqn_planner.situation.intervals import insert
-from risk_dqn_planner.situation.occlusion import cuts_kernel, inside_kernel
+from risk_dqn_planner.situation.occlusion import cuts_kernel, inside_kernel, piece_kernel
 from risk_dqn_planner.situation.paths import PathTable
 from risk_dqn_planner.situation.situations import Floats
 
@@ -46,10 +46,7 @@ def hidden_pieces_kernel(
     while k >= 0 and s[k + 1] > end:
         high, low = min(start, s[k + 1]), max(end, s[k])
         if high > low:
-            length = s[k + 1] - s[k]
-            dx, dy = (xy[k + 1, 0] - xy[k, 0]) / length, (xy[k + 1, 1] - xy[k, 1]) / length
-            ax, ay = xy[k, 0] + (high - s[k]) * dx, xy[k, 1] + (high - s[k]) * dy
-            bx, by = xy[k, 0] + (low - s[k]) * dx, xy[k, 1] + (low - s[k]) * dy
+            ax, ay, bx, by = piece_kernel(xy, s, k, high, low)
             met = cuts_kernel(polygon, ax, ay, bx, by, cuts)
             cuts[met] = 1.0
             begin = 0.0

@@ -82,6 +82,24 @@ def _add(cuts: Floats, count: int, share: float, length: float) -> int:
 
 
 @kernel
+def piece_kernel(
+    xy: Floats, s: Floats, k: int, high: float, low: float
+) -> tuple[float, float, float, float]:
+    """Return both ends, ax, ay, bx, by, of the piece of segment k from arc length high to low.
+
+    xy (K, 2) and s (K,) are the path; the piece runs upstream.
+    """
+    length = s[k + 1] - s[k]
+    dx, dy = (xy[k + 1, 0] - xy[k, 0]) / length, (xy[k + 1, 1] - xy[k, 1]) / length
+    return (
+        xy[k, 0] + (high - s[k]) * dx,
+        xy[k, 1] + (high - s[k]) * dy,
+        xy[k, 0] + (low - s[k]) * dx,
+        xy[k, 1] + (low - s[k]) * dy,
+    )
+
+
+@kernel
 def first_hidden_kernel(xy: Floats, s: Floats, start: float, end: float, polygon: Floats) -> float:
     """Return the first arc length not in the polygon, going upstream from `start` to `end`.
 
@@ -93,10 +111,7 @@ def first_hidden_kernel(xy: Floats, s: Floats, start: float, end: float, polygon
     while k >= 0 and s[k + 1] > end:
         high, low = min(start, s[k + 1]), max(end, s[k])
         if high > low:
-            length = s[k + 1] - s[k]
-            dx, dy = (xy[k + 1, 0] - xy[k, 0]) / length, (xy[k + 1, 1] - xy[k, 1]) / length
-            ax, ay = xy[k, 0] + (high - s[k]) * dx, xy[k, 1] + (high - s[k]) * dy
-            bx, by = xy[k, 0] + (low - s[k]) * dx, xy[k, 1] + (low - s[k]) * dy
+            ax, ay, bx, by = piece_kernel(xy, s, k, high, low)
             count = cuts_kernel(polygon, ax, ay, bx, by, cuts)
             # Without a cut a piece is seen if the one before it was.
             if count > 0 or not tested:

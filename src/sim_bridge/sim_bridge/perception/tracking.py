@@ -24,6 +24,7 @@ from risk_dqn_planner.situation.hidden_space import (
 from risk_dqn_planner.situation.intervals import insert
 from risk_dqn_planner.situation.situations import Booleans, Floats, Integers, Situations
 from sim_bridge.perception.perception import View
+from sim_bridge.perception.visibility import narrowed
 from sim_bridge.world.watched_lines import WatchedLines, watched_lines
 from sim_bridge.world.world import World
 
@@ -123,25 +124,15 @@ def add_shadow(
             apart = (max(a0, z0) + s0 <= 0.0) | (max(a1, z1) + s1 <= 0.0)
             apart |= (max(a2, z2) + s2 <= 0.0) | (max(a3, z3) + s3 <= 0.0)
             if not apart:
-                enter, leave = _narrowed(0.0, 1.0, a0 + s0, z0 + s0)
-                enter, leave = _narrowed(enter, leave, a1 + s1, z1 + s1)
-                enter, leave = _narrowed(enter, leave, a2 + s2, z2 + s2)
-                enter, leave = _narrowed(enter, leave, a3 + s3, z3 + s3)
+                enter, leave = narrowed(0.0, 1.0, a0 + s0, z0 + s0)
+                enter, leave = narrowed(enter, leave, a1 + s1, z1 + s1)
+                enter, leave = narrowed(enter, leave, a2 + s2, z2 + s2)
+                enter, leave = narrowed(enter, leave, a3 + s3, z3 + s3)
                 if enter < leave:
                     low, step = distance[p, k - 1], distance[p, k] - distance[p, k - 1]
                     low, high = low + enter * step, low + leave * step
                     hidden[p] = insert(near, far, p, hidden[p], low, high)
             a0, a1, a2, a3 = z0, z1, z2, z3
-
-
-@kernel
-def _narrowed(enter: float, leave: float, start: float, end: float) -> tuple[float, float]:
-    """Narrow the shares of a way between which it lies in the half-planes seen so far."""
-    share = start / (start - end)
-    return (
-        max(enter, share if end > start else 0.0),
-        min(leave, share if end < start else 1.0),
-    )
 
 
 @kernel

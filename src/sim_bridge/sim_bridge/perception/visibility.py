@@ -178,7 +178,7 @@ def range_exit(ax: float, ay: float, dx: float, dy: float, range_m: float) -> fl
 
 
 @kernel
-def _narrowed(enter: float, leave: float, start: float, end: float) -> tuple[float, float]:
+def narrowed(enter: float, leave: float, start: float, end: float) -> tuple[float, float]:
     """Narrow the shares of a way between which it lies in the half-planes seen so far."""
     share = start / (start - end)
     return (
@@ -203,10 +203,10 @@ def first_in_shadow(
         apart = (max(a[0], z[0]) <= 0.0) | (max(a[1], z[1]) <= 0.0)
         apart |= (max(a[2], z[2]) <= 0.0) | (max(a[3], z[3]) <= 0.0)
         if not apart:
-            enter, leave = _narrowed(0.0, 1.0, a[0], z[0])
-            enter, leave = _narrowed(enter, leave, a[1], z[1])
-            enter, leave = _narrowed(enter, leave, a[2], z[2])
-            enter, leave = _narrowed(enter, leave, a[3], z[3])
+            enter, leave = narrowed(0.0, 1.0, a[0], z[0])
+            enter, leave = narrowed(enter, leave, a[1], z[1])
+            enter, leave = narrowed(enter, leave, a[2], z[2])
+            enter, leave = narrowed(enter, leave, a[3], z[3])
             if enter < leave:
                 return k - 1, enter
         a = z

@@ -13,7 +13,7 @@ from sim_bridge.simulation.randomness import NOISE_STREAM, random_normal
 from sim_bridge.simulation.settings import Settings
 from sim_bridge.simulation.state import MOST_IDS, Episodes, Vehicles
 from sim_bridge.world.matches import Matches
-from sim_bridge.world.path_geometry import table_pose
+from sim_bridge.world.path_geometry import place_ahead, table_pose
 from sim_bridge.world.sight_lines import SightLines
 from sim_bridge.world.world import EgoLane, Lanes
 
@@ -58,10 +58,7 @@ def look(ego: EgoLane, corners: Floats, offset_m: float, episodes: Episodes, vie
     table, ego_s_m, obstacle = ego.table, episodes.ego_s_m, episodes.obstacle
     x_m, y_m, shadows, cast = view.x_m, view.y_m, view.shadows, view.cast
     for b in range(len(x_m)):
-        x, y, heading = table_pose(table, 0, ego_s_m[b])
-        if offset_m != 0.0:
-            x += offset_m * math.cos(heading)
-            y += offset_m * math.sin(heading)
+        x, y = place_ahead(table, 0, ego_s_m[b], offset_m)
         x_m[b], y_m[b] = x, y
         cast[b] = cast_shadows(corners, obstacle, b, x, y, shadows, b)
 

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """How other vehicles come and go, and where there is room for them."""
 
-import math
-
 import numpy as np
 
 from risk_dqn_planner.compiled import kernel
@@ -21,7 +19,7 @@ from sim_bridge.simulation.state import (
     Episodes,
     Vehicles,
 )
-from sim_bridge.world.path_geometry import table_pose
+from sim_bridge.world.path_geometry import place_ahead, table_pose
 from sim_bridge.world.sharing import Sharing
 from sim_bridge.world.world import EgoLane, Lanes, Paths
 
@@ -114,9 +112,8 @@ def entry_in_sight(
     corners (2, K, 4, 2): catalogue of the obstacles; shadows (B, O, 4, 3): memory to work in.
     """
     x, y, _ = table_pose(paths.table, p, 0.0)
-    sensor_x, sensor_y, heading = table_pose(ego.table, 0, episodes.ego_s_m[b])
-    sensor_x += settings.sensor_offset_m * math.cos(heading)
-    sensor_y += settings.sensor_offset_m * math.sin(heading)
+    ego_s_m, ahead_m = episodes.ego_s_m[b], settings.sensor_offset_m
+    sensor_x, sensor_y = place_ahead(ego.table, 0, ego_s_m, ahead_m)
     count = cast_shadows(corners, episodes.obstacle, b, sensor_x, sensor_y, shadows, b)
     range_m = settings.sensor_range_m
     return not point_hidden(x, y, sensor_x, sensor_y, range_m, shadows, b, count)

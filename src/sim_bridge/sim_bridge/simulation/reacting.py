@@ -18,7 +18,7 @@ from sim_bridge.simulation.lags import UNNOTICED, Lags
 from sim_bridge.simulation.settings import Reaction, Settings
 from sim_bridge.simulation.state import SimulationState
 from sim_bridge.simulation.traffic import idm_acceleration
-from sim_bridge.world.path_geometry import table_pose
+from sim_bridge.world.path_geometry import place_ahead, table_pose
 from sim_bridge.world.world import EgoLane, Lanes, Paths
 
 _ABOUT_TO_ENTER_S = 1.0
@@ -58,9 +58,7 @@ def brake_for_egos(
         if not episodes.running[b]:
             continue
         ego_m, ego_mps = episodes.ego_s_m[b], episodes.ego_speed_mps[b]
-        x, y, heading = table_pose(ego.table, 0, ego_m)
-        x += settings.sensor_offset_m * math.cos(heading)
-        y += settings.sensor_offset_m * math.sin(heading)
+        x, y = place_ahead(ego.table, 0, ego_m, settings.sensor_offset_m)
         cast = cast_shadows(corners, episodes.obstacle, b, x, y, shadows, b)
         for i in range(count):
             p = path[b, i]

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """B simulated episodes side by side; the ROS node is a batch of one, training one of thousands."""
 
-import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -40,7 +39,7 @@ from sim_bridge.simulation.starting import start_episodes
 from sim_bridge.simulation.state import NOBODY, empty_state
 from sim_bridge.simulation.stepping import advance, are_actions
 from sim_bridge.world.matches import most_lanes_at_once
-from sim_bridge.world.path_geometry import table_pose
+from sim_bridge.world.path_geometry import place_ahead, table_pose
 from sim_bridge.world.world import build_world
 
 
@@ -346,7 +345,5 @@ class Simulation:
     def visible_area(self, episode: int = 0) -> Floats:
         """Return the polygon (K, 2) that one episode's ego sees."""
         s = self.state.episodes.ego_s_m[episode]
-        x, y, heading = table_pose(self.world.ego.table, 0, s)
-        x += self.settings.sensor_offset_m * math.cos(heading)
-        y += self.settings.sensor_offset_m * math.sin(heading)
+        x, y = place_ahead(self.world.ego.table, 0, s, self.settings.sensor_offset_m)
         return visible_polygon(x, y, self.settings.sensor_range_m, self.obstacles(episode))

@@ -36,6 +36,16 @@ def table_pose(tables: Floats, line: int, s: float) -> tuple[float, float, float
     )
 
 
+@kernel
+def place_ahead(tables: Floats, line: int, s: float, ahead_m: float) -> tuple[float, float]:
+    """Return (x, y) so far straight ahead of where `table_pose` is."""
+    x, y, heading = table_pose(tables, line, s)
+    if ahead_m != 0.0:
+        x += ahead_m * math.cos(heading)
+        y += ahead_m * math.sin(heading)
+    return x, y
+
+
 def sampled(line: Polyline, count: int) -> Floats:
     """Return x, y, heading (count, 3) every SPACING_M, straight on beyond the line's end."""
     at = np.arange(count) * SPACING_M

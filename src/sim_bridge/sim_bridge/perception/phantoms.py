@@ -16,6 +16,7 @@ from risk_dqn_planner.compiled import kernel
 from risk_dqn_planner.situation.situations import Booleans, Floats, Integers
 from sim_bridge.perception.perception import View
 from sim_bridge.perception.visibility import point_hidden
+from sim_bridge.simulation.population import wanted_speed
 from sim_bridge.simulation.randomness import (
     PHANTOM_STREAM,
     random_between,
@@ -81,10 +82,7 @@ def report_phantoms(
     sensor_x_m, sensor_y_m, shadows, cast = view.x_m, view.y_m, view.shadows, view.cast
     first_path, zone_m, exit_m = lanes.first_path, paths.zone_m, paths.exit_m
     range_m, lasts = settings.sensor_range_m, sensing.phantom_steps
-    factor, (slowest_mps, fastest_mps) = (
-        settings.draws.overspeed_factor,
-        settings.draws.desired_speed_mps,
-    )
+    slowest_mps, fastest_mps = settings.draws.desired_speed_mps
     count = len(first_path) - 1
     first = reported.seen.shape[1] - count
     for b in range(reported.seen.shape[0]):
@@ -101,7 +99,7 @@ def report_phantoms(
             low_m = max(zone_m[p] - range_m, 0.0)
             begin_m = random_between(seed, PHANTOM_STREAM, draw + 2, low_m, exit_m[p])
             drawn = random_between(seed, PHANTOM_STREAM, draw + 3, slowest_mps, fastest_mps)
-            mps = factor * min(drawn, paths.limit_mps[p])
+            mps = wanted_speed(drawn, paths.limit_mps[p], settings.draws)
             s = begin_m + mps * since_s
             x, y, _ = table_pose(paths.table, p, s)
             reported.id[b, i] = MOST_IDS + number

@@ -5,7 +5,7 @@ import numpy as np
 
 from risk_dqn_planner.compiled import kernel
 from risk_dqn_planner.geometry.footprint import footprints_overlap
-from risk_dqn_planner.situation.situations import Booleans, Floats, Integers
+from risk_dqn_planner.situation.situations import Booleans, Floats
 from sim_bridge.perception.visibility import cast_shadows, point_hidden
 from sim_bridge.simulation.randomness import (
     VEHICLE_STREAM,
@@ -35,27 +35,26 @@ def has_room(
     p: int,
     s: float,
     desired_mps: float,
-    gap_m: float,
-    headway_s: float,
-    driving: Booleans,
-    path: Integers,
-    s_m: Floats,
-    speed_mps: Floats,
-    table: Floats,
-    length_m: float,
-    width_m: float,
-    low_m: Floats,
-    high_m: Floats,
-    offset_m: Floats,
-    touches: Booleans,
+    settings: Settings,
+    paths: Paths,
+    sharing: Sharing,
+    vehicles: Vehicles,
 ) -> bool:
     """Tell whether a vehicle may be put into place i of episode b, at s on path p.
 
     Behind the next one and ahead of the one behind there must be the standstill gap and the
-    headway; nobody's footprint may come near, whatever lane it is on. Arrays as in Vehicles,
-    Paths and Sharing.
+    headway; nobody's footprint may come near, whatever lane it is on.
     """
-    least_m = length_m + gap_m
+    driving, path, s_m, speed_mps = (
+        vehicles.driving,
+        vehicles.path,
+        vehicles.s_m,
+        vehicles.speed_mps,
+    )
+    low_m, high_m, offset_m = sharing.low_m, sharing.high_m, sharing.offset_m
+    touches, table = sharing.touches, paths.table
+    length_m, width_m = paths.vehicle_length_m, paths.vehicle_width_m
+    least_m, headway_s = length_m + settings.idm.standstill_gap_m, settings.draws.headway_s
     for j in range(driving.shape[1]):
         if j == i or not driving[b, j]:
             continue
@@ -78,22 +77,31 @@ def has_room(
 
 
 @kernel
+def wanted_speed(drawn_mps: float, limit_mps: float, draws: Draws) -> float:
+    """Return how fast a driver wants to go: as drawn, but for the limit, which is overstepped."""
+    return draws.overspeed_factor * min(drawn_mps, limit_mps)
+
+
+@kernel
 def draw_vehicle(
-    seed: np.uint64, number: int, draws: Draws, first_entry: Integers, entry_path: Integers
+    seed: np.uint64, number: int, draws: Draws, lanes: Lanes, limit_mps: Floats
 ) -> tuple[int, float, bool]:
     """Return path, desired speed and whether it yields, of the vehicle with an id.
 
-    All depends on seed and id alone. first_entry and entry_path as in Lanes.
+    All depends on seed and id alone. limit_mps (P,): of the paths.
     """
     draw = number * _DRAWS_PER_VEHICLE
+    first_entry = lanes.first_entry
     # A lane first, so that lanes with many ways in do not have more traffic than others.
     lane = random_index(seed, VEHICLE_STREAM, draw, len(first_entry) - 1)
     first, behind = first_entry[lane], first_entry[lane + 1]
     way = random_index(seed, VEHICLE_STREAM, draw + 1, behind - first)
+    path = lanes.entry_path[first + way]
     low, high = draws.desired_speed_mps
-    desired = random_between(seed, VEHICLE_STREAM, draw + 2, low, high)
+    drawn = random_between(seed, VEHICLE_STREAM, draw + 2, low, high)
     share = random_share(seed, VEHICLE_STREAM, draw + 3)
-    return entry_path[first + way], desired, share < draws.yielding_share
+    desired = wanted_speed(drawn, limit_mps[path], draws)
+    return path, desired, share < draws.yielding_share
 
 
 @kernel
@@ -141,7 +149,6 @@ def replace_those_gone(
         vehicles.leader_due,
     )
     length_m, limit_mps = paths.length_m, paths.limit_mps
-    first_entry, entry_path = lanes.first_entry, lanes.entry_path
     batch, count = driving.shape
     for b in range(batch):
         if not running[b] or phase[b] != 0:
@@ -152,11 +159,9 @@ def replace_those_gone(
             driving[b, i], waiting[b, i] = False, draws.respawn
             for j in range(count):
                 leader_due[b, j] |= leader[b, j] == i
-            p, desired, yields[b, i] = draw_vehicle(
-                seed[b], next_id[b], draws, first_entry, entry_path
+            path[b, i], desired_mps[b, i], yields[b, i] = draw_vehicle(
+                seed[b], next_id[b], draws, lanes, limit_mps
             )
-            path[b, i] = p
-            desired_mps[b, i] = draws.overspeed_factor * min(desired, limit_mps[p])
             ids[b, i], follows_ego[b, i] = next_id[b], False
             next_id[b] += 1
 
@@ -184,15 +189,7 @@ def let_one_in(
         vehicles.desired_speed_mps,
         vehicles.leader_due,
     )
-    low_m, high_m, offset_m, touches = (
-        sharing.low_m,
-        sharing.high_m,
-        sharing.offset_m,
-        sharing.touches,
-    )
-    table, entry_is_far = paths.table, paths.entry_is_far
-    length_m, width_m = paths.vehicle_length_m, paths.vehicle_width_m
-    gap_m, headway_s = settings.idm.standstill_gap_m, settings.draws.headway_s
+    entry_is_far = paths.entry_is_far
     for b in range(len(running)):
         if not running[b] or phase[b] != 0:
             continue
@@ -204,26 +201,7 @@ def let_one_in(
             ego, paths, corners, settings, episodes, b, p, shadows
         ):
             continue
-        if has_room(
-            b,
-            chosen,
-            p,
-            0.0,
-            desired,
-            gap_m,
-            headway_s,
-            driving,
-            path,
-            s_m,
-            speed_mps,
-            table,
-            length_m,
-            width_m,
-            low_m,
-            high_m,
-            offset_m,
-            touches,
-        ):
+        if has_room(b, chosen, p, 0.0, desired, settings, paths, sharing, vehicles):
             driving[b, chosen], waiting[b, chosen], due[b, chosen] = True, False, True
             s_m[b, chosen], speed_mps[b, chosen] = 0.0, desired
 

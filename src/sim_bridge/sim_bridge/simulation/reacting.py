@@ -63,7 +63,7 @@ def brake_for_egos(
         for i in range(count):
             p = path[b, i]
             lane = paths.lane[p]
-            gap_m = paths.exit_m[p] - lanes.zone_m[lane] - s_m[b, i]
+            gap_m = paths.enter_m[p] - s_m[b, i]
             to_zone_m, half_m = lanes.ego_zone_center_m[lane] - ego_m, 0.5 * lanes.ego_zone_m[lane]
             coming = vehicles.driving[b, i] and gap_m > 0.0
             if not (coming and in_the_way(to_zone_m, half_m, ego_mps)):

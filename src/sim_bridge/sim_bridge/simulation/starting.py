@@ -72,19 +72,11 @@ def start_traffic(
     """Draw the vehicles of episodes; who finds no place waits for one upstream."""
     driving, waiting, path, s_m = vehicles.driving, vehicles.waiting, vehicles.path, vehicles.s_m
     speed_mps, desired_mps = vehicles.speed_mps, vehicles.desired_speed_mps
-    low_m, high_m, offset_m, touches = (
-        sharing.low_m,
-        sharing.high_m,
-        sharing.offset_m,
-        sharing.touches,
-    )
     seeds, next_id = episodes.seed, episodes.next_id
     ids, yields, follows_ego = vehicles.id, vehicles.yields, vehicles.follows_ego
     leader_due = vehicles.leader_due
-    first_entry, entry_path = lanes.first_entry, lanes.entry_path
-    table, zone_m, limit_mps = paths.table, paths.zone_m, paths.limit_mps
-    length_m, width_m = paths.vehicle_length_m, paths.vehicle_width_m
-    draws, gap_m = settings.draws, settings.idm.standstill_gap_m
+    zone_m, limit_mps = paths.zone_m, paths.limit_mps
+    draws = settings.draws
     nearest_m, furthest_m = draws.start_distance_m
     fewest, most = draws.vehicles
     for b in range(len(mask)):
@@ -96,34 +88,14 @@ def start_traffic(
         for i in range(driving.shape[1]):
             driving[b, i], waiting[b, i], leader_due[b, i] = False, i < count, True
         for i in range(count):
-            p, desired, yields[b, i] = draw_vehicle(seed, i + 1, draws, first_entry, entry_path)
+            p, desired, yields[b, i] = draw_vehicle(seed, i + 1, draws, lanes, limit_mps)
             ids[b, i], follows_ego[b, i], path[b, i] = i + 1, False, p
-            speed_mps[b, i] = draws.overspeed_factor * min(desired, limit_mps[p])
-            desired_mps[b, i] = speed_mps[b, i]
+            speed_mps[b, i] = desired_mps[b, i] = desired
             low, high = min(nearest_m, zone_m[p]), min(furthest_m, zone_m[p])
             for attempt in range(_ATTEMPTS):
                 draw = (i + 1) * _ATTEMPTS + attempt
                 s = zone_m[p] - random_between(seed, PLACE_STREAM, draw, low, high)
-                if has_room(
-                    b,
-                    i,
-                    p,
-                    s,
-                    desired_mps[b, i],
-                    gap_m,
-                    draws.headway_s,
-                    driving,
-                    path,
-                    s_m,
-                    speed_mps,
-                    table,
-                    length_m,
-                    width_m,
-                    low_m,
-                    high_m,
-                    offset_m,
-                    touches,
-                ):
+                if has_room(b, i, p, s, desired, settings, paths, sharing, vehicles):
                     driving[b, i], waiting[b, i], s_m[b, i] = True, False, s
                     break
 

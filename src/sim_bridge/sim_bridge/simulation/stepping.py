@@ -185,28 +185,28 @@ def note_time_gaps(
     running, tick = state.episodes.running, state.episodes.tick
     s_m, step_m = state.episodes.ego_s_m, state.episodes.ego_step_m
     least_s, last_left_s = state.counts.least_time_gap_s, state.counts.last_left_s
-    zone_m, ego_zone_m, center_m = lanes.zone_m, lanes.ego_zone_m, lanes.ego_zone_center_m
+    ego_zone_m, center_m = lanes.ego_zone_m, lanes.ego_zone_center_m
     for b in range(len(least_s)):
         after = s_m[b]
         if not running[b] or after <= first_zone_m:
             continue
         before = after - step_m[b]
-        for lane in range(len(zone_m)):
+        for lane in range(len(center_m)):
             half = 0.5 * ego_zone_m[lane]
             if before <= center_m[lane] - half < after:
                 least_s[b] = min(least_s[b], tick[b] * step_s - last_left_s[b, lane])
             if before <= center_m[lane] + half < after:
-                gap_s = time_to_next(lane, zone_m[lane], paths, state.vehicles, b)
+                gap_s = time_to_next(lane, paths, state.vehicles, b)
                 least_s[b] = min(least_s[b], gap_s)
 
 
 @kernel
-def time_to_next(lane: int, zone_m: float, paths: Paths, vehicles: Vehicles, b: int) -> float:
+def time_to_next(lane: int, paths: Paths, vehicles: Vehicles, b: int) -> float:
     """Return when the next vehicle reaches a lane's zone at its present speed, or infinity."""
     next_s = math.inf
     for i in range(vehicles.driving.shape[1]):
         p = vehicles.path[b, i]
-        way = paths.exit_m[p] - zone_m - vehicles.s_m[b, i]
+        way = paths.enter_m[p] - vehicles.s_m[b, i]
         if vehicles.driving[b, i] and paths.lane[p] == lane and way >= 0.0:
             next_s = min(next_s, way / max(vehicles.speed_mps[b, i], _STANDING_MPS))
     return next_s

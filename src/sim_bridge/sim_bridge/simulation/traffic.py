@@ -198,7 +198,7 @@ def yield_to_egos(
                 continue
             p = vehicles.path[b, i]
             lane = paths.lane[p]
-            gap_m = paths.exit_m[p] - lanes.zone_m[lane] - vehicles.s_m[b, i]
+            gap_m = paths.enter_m[p] - vehicles.s_m[b, i]
             if yields_now(
                 gap_m,
                 vehicles.speed_mps[b, i],

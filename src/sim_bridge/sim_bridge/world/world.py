@@ -56,9 +56,9 @@ class EgoLane(NamedTuple):
 class Paths(NamedTuple):
     """The P paths of other vehicles. table (P, K, 3): x, y, heading every SPACING_M.
 
-    All others (P,). length_m: of the path; lane: index into M lanes; limit_mps; zone_m, exit_m:
-    the conflict zone's centre and end; shift_m: from arc length on the model's path to that
-    used here; entry_is_far: vehicles enter beyond the sensor's range; contact_low_m,
+    All others (P,). length_m: of the path; lane: index into M lanes; limit_mps; zone_m, enter_m,
+    exit_m: the conflict zone's centre, beginning and end; shift_m: from arc length on the model's
+    path to that used here; entry_is_far: vehicles enter beyond the sensor's range; contact_low_m,
     contact_high_m: outside of these a vehicle cannot touch the ego.
     """
 
@@ -67,6 +67,7 @@ class Paths(NamedTuple):
     lane: Integers
     limit_mps: Floats
     zone_m: Floats
+    enter_m: Floats
     exit_m: Floats
     shift_m: Floats
     entry_is_far: Booleans
@@ -168,6 +169,7 @@ def _tables(
     table = np.array([sampled(line, count) for line in traffic.line])
     zone = np.array([path.zone_center_m for path in conflicts]) + traffic.shift_m
     lane_zone = np.array([model.lanes[k].zone_length_m for k in lanes])
+    exit_m = zone + 0.5 * lane_zone
     starts = [lane.ego_zone_center_m - 0.5 * lane.ego_zone_length_m for lane in model.lanes]
     own, other = model.ego_dimensions, model.traffic_dimensions
     ego_contact, contact = contact_intervals(ego_table, table, own, other)
@@ -187,7 +189,8 @@ def _tables(
         lane=np.array(lanes, dtype=np.int64),
         limit_mps=np.array([model.lanes[k].speed_limit_mps for k in lanes]),
         zone_m=zone,
-        exit_m=zone + 0.5 * lane_zone,
+        enter_m=exit_m - lane_zone,
+        exit_m=exit_m,
         shift_m=np.array(traffic.shift_m),
         entry_is_far=zone > sensor_range_m,
         contact_low_m=np.ascontiguousarray(contact[:, 0]),

@@ -17,10 +17,8 @@ from sim_bridge.scenarios.fields import EgoStart, Interval, Obstacles, Sensor
 from sim_bridge.scenarios.loading import Scenario
 from sim_bridge.simulation.population import first_waiting, has_room, let_one_in, replace_those_gone
 from sim_bridge.simulation.simulation import Simulation
-from sim_bridge.simulation.state import Vehicles
 from sim_bridge.simulation.traffic import find_leaders
 from sim_bridge.world.path_geometry import cut
-from sim_bridge.world.world import World
 
 WithVehicles = Callable[..., Scenario]
 STOP = 0
@@ -128,29 +126,12 @@ def test_obstacles_are_picked_for_each_side_on_its_own(
     assert len({tuple(row) for row in obstacle}) > 195
 
 
-def room(world: World, vehicles: Vehicles, path: int, s: float, headway_s: float) -> bool:
+def room(simulation: Simulation, path: int, s: float, headway_s: float) -> bool:
     """Whether there is room for a second vehicle that wants to drive at 4 m/s."""
-    paths, sharing = world.paths, world.sharing
-    return has_room(
-        0,
-        1,
-        path,
-        s,
-        4.0,
-        2.0,
-        headway_s,
-        vehicles.driving,
-        vehicles.path,
-        vehicles.s_m,
-        vehicles.speed_mps,
-        paths.table,
-        paths.vehicle_length_m,
-        paths.vehicle_width_m,
-        sharing.low_m,
-        sharing.high_m,
-        sharing.offset_m,
-        sharing.touches,
-    )
+    settings = simulation.settings
+    settings = settings._replace(draws=settings.draws._replace(headway_s=headway_s))
+    world, vehicles = simulation.world, simulation.state.vehicles
+    return has_room(0, 1, path, s, 4.0, settings, world.paths, world.sharing, vehicles)
 
 
 @pytest.mark.parametrize(
@@ -173,11 +154,11 @@ def test_room_for_a_vehicle_is_the_standstill_gap_and_the_followers_headway(
     free: bool,
 ):
     simulation = started(crossing_model, with_vehicles(base, 2), batch=1)
-    world, vehicles = simulation.world, simulation.state.vehicles
+    vehicles = simulation.state.vehicles
     vehicles.driving[0] = [True, False]
     vehicles.path[0] = 0
     vehicles.s_m[0, 0], vehicles.speed_mps[0, 0] = 50.0, 6.0
-    assert room(world, vehicles, 0, s, headway_s=1.5) == free
+    assert room(simulation, 0, s, headway_s=1.5) == free
 
 
 def test_there_is_no_room_where_another_lane_crosses_an_occupied_place(
@@ -192,9 +173,9 @@ def test_there_is_no_room_where_another_lane_crosses_an_occupied_place(
     crossing = world.paths.table[1]
     s = 0.5 * int(np.abs(crossing[:, 1] - 3.5).argmin())
     vehicles.s_m[0, 0] = world.paths.zone_m[0] - crossing[int(2 * s), 0]
-    assert not room(world, vehicles, 1, s, headway_s=0.0)
+    assert not room(simulation, 1, s, headway_s=0.0)
     vehicles.s_m[0, 0] = 0.0
-    assert room(world, vehicles, 1, s, headway_s=0.0)
+    assert room(simulation, 1, s, headway_s=0.0)
 
 
 def drive_on(simulation: Simulation, steps: int) -> set[tuple[int, int]]:

@@ -13,7 +13,7 @@ from bench.success import EPISODES, LEVELS, Reached
 from bench.timing import Stopwatch
 from sim_bridge.environment.episodes import drive
 from sim_bridge.environment.interface import Outcome
-from sim_bridge.environment.place import Place, load_place
+from sim_bridge.environment.place import Places
 from sim_bridge.environment.seeds import VALIDATION_SEEDS, fixed_seeds
 from sim_bridge.learning.config import EvaluationConfig, TrainingConfig
 from sim_bridge.learning.export import initial_weights
@@ -51,24 +51,25 @@ NOTES = (
 )
 
 
-def _session(config: TrainingConfig, seed: int, place: Place) -> Session:
+def _session(config: TrainingConfig, seed: int, places: Places) -> Session:
     run = Run(config, REWARD, seed, MAP, SCENARIO)
-    return Session(run, [place], initial_weights(seed))
+    return Session(run, [places], initial_weights(seed))
 
 
-def compile_all(place: Place) -> None:
+def compile_all(places: Places) -> None:
     """Train a little, so that no later measurement waits for the compiler."""
     for name in ("tuned", "paper"):
         config = preset_named(name)
         steps = 2 * max(config.warmup_steps, config.environments)
-        for _ in _session(replace(config, steps=steps), 0, place).run():
+        for _ in _session(replace(config, steps=steps), 0, places).run():
             pass
 
 
-def time_ours(place: Place, seed: int, limit_s: float) -> Reached:
+def time_ours(places: Places, seed: int, limit_s: float) -> Reached:
     """Train the preset `tuned` until the highest level is reached or the time is over."""
-    session = _session(replace(preset_named("tuned"), evaluation=LOOKS), seed, place)
-    validation = place.simulation(load_scenario(SCENARIO), EPISODES)
+    session = _session(replace(preset_named("tuned"), evaluation=LOOKS), seed, places)
+    scenario = load_scenario(SCENARIO)
+    validation = places.of(scenario).simulation(scenario, EPISODES)
     seeds = fixed_seeds(VALIDATION_SEEDS, EPISODES)
     reached, watch = Reached(), Stopwatch()
     for record in session.run():
@@ -80,13 +81,13 @@ def time_ours(place: Place, seed: int, limit_s: float) -> Reached:
     return reached
 
 
-def paper_ms_a_step(place: Place, steps: int) -> tuple[float, float]:
+def paper_ms_a_step(places: Places, steps: int) -> tuple[float, float]:
     """Return the milliseconds (processor, of the day) that a step of the preset `paper` takes.
 
     The first steps, in which nothing is learned yet, are left out. Exploration falls as in a
     whole run, only sooner.
     """
-    session = _session(replace(preset_named("paper"), steps=steps), 0, place)
+    session = _session(replace(preset_named("paper"), steps=steps), 0, places)
     watch = Stopwatch()
     begin = (0, 0.0, 0.0)
     for record in session.run():
@@ -116,17 +117,17 @@ def compare(ours_s: float | None, peers: Sequence[Reached], level: float) -> Goa
 
 def measure(effort: Effort) -> Section:
     """Train ours, the paper's preset for a while, and the peer."""
-    place = load_place(MAP)
+    places = Places.named(MAP)
     say("compiling")
-    compile_all(place)
+    compile_all(places)
     ours = []
     for seed in range(effort.seeds):
-        ours.append(time_ours(place, seed, effort.ours_limit_s))
+        ours.append(time_ours(places, seed, effort.ours_limit_s))
         say(f"ours, seed {seed}: success {ours[-1].best:.1%} after {ours[-1].cpu_s:.0f} s")
     say(f"preset paper, {effort.paper_steps} steps")
-    cpu_ms, wall_ms = paper_ms_a_step(place, effort.paper_steps)
+    cpu_ms, wall_ms = paper_ms_a_step(places, effort.paper_steps)
     tuned_s = typical(ours, HIGH_LEVEL)
-    peers, missing = _peers(place, tuned_s, effort)
+    peers, missing = _peers(places, tuned_s, effort)
     minutes = cpu_ms * PAPER_STEPS / 60e3
     return Section(
         figures={
@@ -154,7 +155,7 @@ def measure(effort: Effort) -> Section:
 
 
 def _peers(
-    place: Place, tuned_s: float | None, effort: Effort
+    places: Places, tuned_s: float | None, effort: Effort
 ) -> tuple[dict[str, Reached], dict[str, str]]:
     """Train stable-baselines3 in each of its setups; return what they reached, or why not."""
     try:
@@ -167,5 +168,5 @@ def _peers(
     trained = {}
     for name, setup in stable_baselines.SETUPS.items():
         say(f"stable-baselines3, {name}, at most {limit_s:.0f} s")
-        trained[name] = stable_baselines.train(setup, place, limit_s)
+        trained[name] = stable_baselines.train(setup, places.usual, limit_s)
     return trained, {}

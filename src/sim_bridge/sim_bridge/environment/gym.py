@@ -24,7 +24,7 @@ from risk_dqn_planner.risk.config import RiskConfig
 from risk_dqn_planner.state.history import StateEncoder
 from sim_bridge.environment.batch import BatchEnvironment
 from sim_bridge.environment.interface import EnvironmentStep, Outcome
-from sim_bridge.environment.place import load_place
+from sim_bridge.environment.place import Places
 from sim_bridge.environment.rewards import reward_named
 from sim_bridge.environment.seeds import TRAINING_SEEDS
 from sim_bridge.environment.snapshot import snapshot
@@ -38,8 +38,9 @@ def _observation_space(environment: BatchEnvironment) -> spaces.Space[NDArray[np
 
 
 def _build(map_name: str, scenario: str, reward: str, batch: int) -> BatchEnvironment:
+    drawn = load_scenario(scenario)
     return BatchEnvironment(
-        simulation=load_place(map_name).simulation(load_scenario(scenario), batch),
+        simulation=Places.named(map_name).of(drawn).simulation(drawn, batch),
         encoder=StateEncoder(),
         reward=reward_named(reward),
         risk=RiskConfig(),

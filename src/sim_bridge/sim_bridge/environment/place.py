@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Where episodes take place: an intersection of an own map or of any Lanelet2 file."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,9 @@ from risk_dqn_planner.situation.config import INSTANTANEOUS, TrackingConfig
 from sim_bridge.maps import shipped_map
 from sim_bridge.scenarios.loading import Scenario
 from sim_bridge.simulation.simulation import Simulation
+
+# A shorter sight does not change the roads that traffic comes along.
+USUAL_REACH_M = IntersectionConfig.sensor_range_m
 
 
 @dataclass(frozen=True)
@@ -45,17 +49,52 @@ class Place:
         )
 
 
+class Places:
+    """One intersection, with lanes as long as the sensor of a scenario sees.
+
+    Scenarios that see no further than usual share one place, so that longer lanes for the others
+    change nothing for them.
+    """
+
+    def __init__(self, load: Callable[[float], Place]) -> None:
+        """Take what loads the place with lanes of a length [m] upstream."""
+        self._load = cache(load)
+        self.usual = self._load(USUAL_REACH_M)
+
+    @classmethod
+    def named(
+        cls,
+        map_name: str,
+        route: tuple[int, ...] | None = None,
+        origin: MapOrigin | None = None,
+        projector: str = "utm",
+    ) -> "Places":
+        """Take an own map by its name, or an .osm file.
+
+        Raises:
+            ConfigurationError, MapError, RouteError: as `load_place`.
+        """
+        return cls(lambda reach_m: load_place(map_name, route, origin, projector, reach_m))
+
+    def of(self, scenario: Scenario) -> Place:
+        """Return the place for a scenario.
+
+        Raises:
+            MapError, RouteError: it cannot be loaded.
+        """
+        return self._load(max(scenario.sensor.range_m, USUAL_REACH_M))
+
+
 def load_place(
     map_name: str,
     route: tuple[int, ...] | None = None,
     origin: MapOrigin | None = None,
     projector: str = "utm",
-    sensor_range_m: float = IntersectionConfig.sensor_range_m,
+    reach_m: float = USUAL_REACH_M,
 ) -> Place:
-    """Load an own map by its name, or an .osm file, which needs a route and an origin.
+    """Load an own map by its name, or an .osm file, which needs a route.
 
-    sensor_range_m: lanes reach at least so far upstream, where the map does; never less than the
-    default, so that a shorter sight does not change the roads that traffic comes along.
+    reach_m: as in `place_on`. Without an origin an .osm file is projected from its first node.
 
     Raises:
         ConfigurationError: a file without route. MapError, RouteError: neither can be used.
@@ -67,20 +106,15 @@ def load_place(
         path, route, origin = own.path, route or own.route, origin or own.origin
     if route is None:
         raise ConfigurationError(f"{map_name} is no own map, so its route must be given")
-    least_m = IntersectionConfig.sensor_range_m
-    config = IntersectionConfig(sensor_range_m=max(sensor_range_m, least_m))
-    return place_on(map_name, load_map(path, origin, projector), route, config)
+    return place_on(map_name, load_map(path, origin, projector), route, reach_m)
 
 
 def place_on(
-    map_name: str,
-    road_map: RoadMap,
-    route: Sequence[int],
-    config: IntersectionConfig | None = None,
+    map_name: str, road_map: RoadMap, route: Sequence[int], reach_m: float = USUAL_REACH_M
 ) -> Place:
     """Take the intersection along a route of a loaded map.
 
-    config: a scenario whose sensor sees further than 70 m needs lanes of that length.
+    reach_m: lanes reach at least so far upstream, where the map does: as far as the sensor sees.
 
     Raises:
         RouteError: the route does not fit the map.
@@ -89,5 +123,5 @@ def place_on(
         np.array([(point.x, point.y) for point in lanelet.polygon2d()])
         for lanelet in road_map.lanelet_map.laneletLayer
     )
-    model = build_intersection(road_map, route, config or IntersectionConfig())
+    model = build_intersection(road_map, route, IntersectionConfig(sensor_range_m=reach_m))
     return Place(map_name, model, outlines)

@@ -5,48 +5,24 @@ import hashlib
 import platform
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cache
 from importlib.metadata import version
 from typing import Any
 
 import numpy as np
 
 from risk_dqn_planner.errors import ScenarioError
-from risk_dqn_planner.intersection.config import IntersectionConfig
-from sim_bridge.environment.place import Place
+from sim_bridge.environment.place import Place, Places
 from sim_bridge.environment.seeds import TEST_SEEDS, fixed_seeds
 from sim_bridge.evaluation.cells import Cell, what_is_drawn
 from sim_bridge.evaluation.rollout import Clairvoyant, Contestant, joined, roll_out
 from sim_bridge.evaluation.store import Store, sources_fingerprint
 from sim_bridge.evaluation.summary import summarise, summarise_first
 from sim_bridge.learning.checkpoint import git_revision
-from sim_bridge.scenarios.loading import Scenario
 
 # Batches are no larger than memory and the wish to interrupt allow; results do not depend on it.
 BATCH = 500
 
 Advance = Callable[[int], None]
-
-
-class Places:
-    """One intersection, with lanes as long as the sensor of a scenario sees.
-
-    Scenarios that see no further than usual share one place, so that longer lanes for the others
-    change nothing for them.
-    """
-
-    def __init__(self, load: Callable[[float], Place]) -> None:
-        """Take what loads the place with lanes of a length [m] upstream."""
-        self._load = cache(load)
-        self.usual = self._load(IntersectionConfig.sensor_range_m)
-
-    def of(self, scenario: Scenario) -> Place:
-        """Return the place for a scenario.
-
-        Raises:
-            MapError, RouteError: it cannot be loaded.
-        """
-        return self._load(max(scenario.sensor.range_m, IntersectionConfig.sensor_range_m))
 
 
 @dataclass(frozen=True)

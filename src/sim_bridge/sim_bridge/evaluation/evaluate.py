@@ -21,8 +21,8 @@ from risk_dqn_planner.errors import ConfigurationError, PlannerError
 from risk_dqn_planner.map.loader import MapOrigin
 from risk_dqn_planner.map.route import parse_route
 from risk_dqn_planner.policies.shipped import shipped_policies
-from sim_bridge.environment.place import load_place
-from sim_bridge.evaluation.campaign import Campaign, Places, has_optimum, versions
+from sim_bridge.environment.place import Places
+from sim_bridge.evaluation.campaign import Campaign, has_optimum, versions
 from sim_bridge.evaluation.cells import Cell, cells_of, paper_cells
 from sim_bridge.evaluation.contestants import DEFAULT_POLICIES, contestants, named_policies
 from sim_bridge.evaluation.progress import progress_on
@@ -95,11 +95,7 @@ def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
 def _places(arguments: argparse.Namespace) -> Places:
     route = None if arguments.route is None else parse_route(arguments.route)
     origin = MapOrigin.from_text(arguments.origin) if arguments.origin else None
-    return Places(
-        lambda reach_m: load_place(
-            arguments.map or PAPER_MAP, route, origin, sensor_range_m=reach_m
-        )
-    )
+    return Places.named(arguments.map or PAPER_MAP, route, origin)
 
 
 def _run(

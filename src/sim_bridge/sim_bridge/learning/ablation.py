@@ -23,7 +23,7 @@ from risk_dqn_planner.policies.supervised import Supervisor
 from risk_dqn_planner.policies.supervised_loading import is_sound
 from sim_bridge.environment.episodes import DrivenEpisodes, drive
 from sim_bridge.environment.interface import Outcome
-from sim_bridge.environment.place import Place, load_place
+from sim_bridge.environment.place import Places
 from sim_bridge.environment.seeds import TEST_SEEDS, fixed_seeds
 from sim_bridge.learning.checkpoint import POLICY, RunFolder
 from sim_bridge.learning.config import AdviceConfig
@@ -167,7 +167,7 @@ def _spread(values: Sequence[float], name: str) -> str:
     return f"{mean} [{low}, {high}]"
 
 
-def _train(run: Run, places: Sequence[Place], folder: Path) -> None:
+def _train(run: Run, places: Sequence[Places], folder: Path) -> None:
     """Train to the end, or go on with it, unless it is done already."""
     files = RunFolder(folder, run)
     if files.finished:
@@ -179,17 +179,18 @@ def _train(run: Run, places: Sequence[Place], folder: Path) -> None:
     files.finish(session, folder.name)
 
 
-def _drive(run: Run, places: Sequence[Place], policy: Path, episodes: int) -> Figures:
+def _drive(run: Run, places: Sequence[Places], policy: Path, episodes: int) -> Figures:
     """Drive test episodes in each cell of the run, under the enforcing supervisor."""
     learned = load_policy(str(policy), assumptions=run.assumptions)
     driver = learned if is_sound(learned) else Supervisor(learned, assumptions=run.assumptions)
     seeds = fixed_seeds(TEST_SEEDS, episodes)
+    scenarios = {name: load_scenario(name) for name in run.scenarios}
     cells = {
         name: [
-            drive(place.simulation(load_scenario(name), episodes, run.memory), driver, seeds)
+            drive(place.of(scenario).simulation(scenario, episodes, run.memory), driver, seeds)
             for place in places
         ]
-        for name in run.scenarios
+        for name, scenario in scenarios.items()
     }
     shares = {name: figures_of(parts)["success"] for name, parts in cells.items()}
     return figures_of([part for parts in cells.values() for part in parts]) | shares
@@ -245,7 +246,7 @@ def _seeds(text: str) -> list[int]:
 def _compare(arguments: argparse.Namespace) -> None:
     reference, changes = _reference(arguments), _changes(arguments.variants.split(","))
     seeds, out = _seeds(arguments.seeds), arguments.out
-    places = [load_place(name) for name in reference.map_names]
+    places = [Places.named(name) for name in reference.map_names]
     results: dict[str, list[Figures]] = {}
     for name, change in changes.items():
         for seed in seeds:

@@ -28,7 +28,7 @@ from sim_bridge.environment.advisor import Advisor
 from sim_bridge.environment.batch import BatchEnvironment
 from sim_bridge.environment.episodes import DrivenEpisodes, drive
 from sim_bridge.environment.interface import Environment, Outcome
-from sim_bridge.environment.place import Place
+from sim_bridge.environment.place import Place, Places
 from sim_bridge.environment.rewards import reward_named
 from sim_bridge.environment.seeds import VALIDATION_SEEDS, fixed_seeds
 from sim_bridge.environment.side_by_side import SideBySide, shares_of
@@ -181,7 +181,7 @@ def _simulations(courses: Sequence[Course], count: int, memory: str) -> list[Sim
 class Session:
     """Trains as a run describes and remembers the policy that did best on validation."""
 
-    def __init__(self, run: Run, places: Sequence[Place], initial_weights: Array) -> None:
+    def __init__(self, run: Run, places: Sequence[Places], initial_weights: Array) -> None:
         """Build simulators, environments and learner; places: the run's maps, in their order.
 
         Raises:
@@ -191,7 +191,8 @@ class Session:
         self.run_description = run
         self.state_config = StateConfig()
         self.outlook_config = OutlookConfig()
-        courses = [(place, load_scenario(name)) for place in places for name in run.scenarios]
+        scenarios = [load_scenario(name) for name in run.scenarios]
+        courses = [(place.of(scenario), scenario) for place in places for scenario in scenarios]
         self.decision_period_s = courses[0][1].timing.decision_period_s
         evaluation = run.config.evaluation
         environment = self._environment(courses)

@@ -18,7 +18,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, Ti
 from risk_dqn_planner.errors import PlannerError
 from risk_dqn_planner.map.loader import MapOrigin
 from risk_dqn_planner.map.route import parse_route
-from sim_bridge.environment.place import load_place
+from sim_bridge.environment.place import Places
 from sim_bridge.environment.rewards import REWARDS
 from sim_bridge.learning.checkpoint import RunFolder
 from sim_bridge.learning.config import TrainingConfig
@@ -135,7 +135,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             supervisor=arguments.supervisor,
             memory=arguments.memory,
         )
-        places = [load_place(name, route, origin) for name in run.map_names]
+        places = [Places.named(name, route, origin) for name in run.map_names]
         folder = RunFolder(out, run)
         if folder.finished:
             console.print(f"{out} is trained already; delete it to train again")

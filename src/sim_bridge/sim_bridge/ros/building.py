@@ -4,9 +4,8 @@
 from collections.abc import Sequence
 
 from risk_dqn_planner.decision import Action
-from risk_dqn_planner.intersection.config import IntersectionConfig
 from risk_dqn_planner.map.loader import RoadMap
-from sim_bridge.environment.place import place_on
+from sim_bridge.environment.place import Places, place_on
 from sim_bridge.scenarios.loading import load_scenario
 from sim_bridge.simulation.simulation import Simulation
 
@@ -15,8 +14,8 @@ class SimulationShelf:
     """Simulations on one route by the name of their scenario."""
 
     def __init__(self, road_map: RoadMap, route: Sequence[int]) -> None:
-        self._road_map = road_map
-        self._route = tuple(route)
+        name, ids = str(road_map.path), tuple(route)
+        self._places = Places(lambda reach_m: place_on(name, road_map, ids, reach_m))
         self._simulations: dict[str, Simulation] = {}
 
     def get(self, scenario_name: str) -> Simulation:
@@ -28,10 +27,7 @@ class SimulationShelf:
         """
         if scenario_name not in self._simulations:
             scenario = load_scenario(scenario_name)
-            # Lanes as long as the situation node's, which knows how far the sensor sees.
-            config = IntersectionConfig(sensor_range_m=scenario.sensor.range_m)
-            place = place_on(str(self._road_map.path), self._road_map, self._route, config)
-            simulation = place.simulation(scenario, 1)
+            simulation = self._places.of(scenario).simulation(scenario, 1)
             _compile(simulation)
             self._simulations[scenario_name] = simulation
         return self._simulations[scenario_name]

@@ -8,7 +8,10 @@ import numpy as np
 import pytest
 
 from risk_dqn_planner.errors import ConfigurationError, ScenarioError
+from risk_dqn_planner.map.loader import RoadMap
+from sim_bridge.environment import place as place_module
 from sim_bridge.environment.interface import Outcome
+from sim_bridge.environment.place import Place
 from sim_bridge.environment.registration import ID
 
 
@@ -47,6 +50,18 @@ def test_a_seed_names_the_same_episode_alone_and_in_a_vector() -> None:
     for k in range(3):
         alone, _ = one.reset(seed=40 + k)
         np.testing.assert_array_equal(states[k], alone)
+
+
+def test_lanes_reach_as_far_as_the_sensor_sees(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked, place_on = [], place_module.place_on
+
+    def build(name: str, road_map: RoadMap, route: tuple[int, ...], reach_m: float) -> Place:
+        asked.append(reach_m)
+        return place_on(name, road_map, route, reach_m)
+
+    monkeypatch.setattr(place_module, "place_on", build)
+    gymnasium.make(ID, scenario="demo_light")
+    assert max(asked) == 100.0
 
 
 def test_time_limit_truncates_and_goal_or_collision_terminates() -> None:

@@ -5,10 +5,8 @@ from typing import Any
 
 import pytest
 
-from sim_bridge.environment import place as place_module
-from sim_bridge.environment.place import Place, load_place
+from sim_bridge.environment.place import Place, Places, load_place
 from sim_bridge.evaluation import campaign, evaluate
-from sim_bridge.evaluation.campaign import Places
 from sim_bridge.evaluation.cells import FINITE, RESPAWNING, Cell, paper_cells, what_is_drawn
 from sim_bridge.evaluation.reporting.paper_values import paper_role
 
@@ -123,25 +121,15 @@ def test_every_line_holds_what_the_format_promises(tmp_path: Path) -> None:
 def test_lanes_reach_as_far_as_the_sensor_of_a_cell_and_no_other_cell_is_touched() -> None:
     asked: list[float] = []
 
-    def load(sensor_range_m: float) -> Place:
-        asked.append(sensor_range_m)
-        return load_place("four_way", sensor_range_m=sensor_range_m)
+    def load(reach_m: float) -> Place:
+        asked.append(reach_m)
+        return load_place("four_way", reach_m=reach_m)
 
     places = Places(load)
     chosen = {cell: places.of(cell.load()) for cell in paper_cells()}
     assert asked == [70.0, 90.0]
     for cell, place in chosen.items():
         assert (place is places.usual) == (cell.sensor_range_m != 90.0)
-
-
-@pytest.mark.parametrize(("sensor_range_m", "reach_m"), [(40.0, 70.0), (70.0, 70.0), (90.0, 90.0)])
-def test_a_place_is_built_for_at_least_the_usual_range(
-    sensor_range_m: float, reach_m: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    built = []
-    monkeypatch.setattr(place_module, "place_on", lambda *given: built.append(given[-1]))
-    load_place("four_way", sensor_range_m=sensor_range_m)
-    assert [config.sensor_range_m for config in built] == [reach_m]
 
 
 def test_the_clairvoyant_is_left_out_where_traffic_reacts(

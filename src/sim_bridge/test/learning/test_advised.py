@@ -19,7 +19,7 @@ from sim_bridge.environment.advisor import Advisor
 from sim_bridge.environment.batch import BatchEnvironment
 from sim_bridge.environment.episodes import drive
 from sim_bridge.environment.interface import Outcome
-from sim_bridge.environment.place import load_place
+from sim_bridge.environment.place import Places
 from sim_bridge.environment.rewards import reward_named
 from sim_bridge.environment.seeds import VALIDATION_SEEDS, fixed_seeds
 from sim_bridge.learning.checkpoint import RunFolder
@@ -62,7 +62,7 @@ ADVISED = Run(
     scenario="dense_traffic",
     supervisor="enforce",
 )
-FOUR_WAY = load_place("four_way")
+FOUR_WAY = Places.named("four_way")
 
 
 def session(run: Run = ADVISED) -> Session:
@@ -71,7 +71,7 @@ def session(run: Run = ADVISED) -> Session:
 
 def environment(batch: int, advisor: Advisor | None = None) -> BatchEnvironment:
     return BatchEnvironment(
-        FOUR_WAY.simulation(load_scenario("dense_traffic"), batch),
+        FOUR_WAY.usual.simulation(load_scenario("dense_traffic"), batch),
         StateEncoder(),
         reward_named("progress"),
         RiskConfig(),
@@ -98,7 +98,7 @@ def test_an_exported_policy_drives_as_validation_said(tmp_path: Path) -> None:
     list(one.run())
     path = RunFolder(tmp_path, ADVISED).finish(one, "tiny")
     policy = load_policy(str(path))
-    simulation = FOUR_WAY.simulation(load_scenario("dense_traffic"), 5)
+    simulation = FOUR_WAY.usual.simulation(load_scenario("dense_traffic"), 5)
     driven = drive(simulation, policy, fixed_seeds(VALIDATION_SEEDS, 5))
     assert one.best is not None
     assert Score.of([driven]) == one.best.score

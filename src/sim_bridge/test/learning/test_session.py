@@ -19,7 +19,7 @@ from risk_dqn_planner.state.history import StateEncoder
 from sim_bridge.environment.batch import BatchEnvironment
 from sim_bridge.environment.episodes import drive
 from sim_bridge.environment.interface import Outcome
-from sim_bridge.environment.place import Place, load_place
+from sim_bridge.environment.place import Place, Places, load_place
 from sim_bridge.environment.rewards import reward_named
 from sim_bridge.environment.seeds import VALIDATION_SEEDS, fixed_seeds
 from sim_bridge.learning.checkpoint import RunFolder
@@ -53,8 +53,8 @@ TINY = Run(
 
 
 @lru_cache
-def place() -> Place:
-    return load_place("four_way")
+def place(map_name: str = "four_way") -> Places:
+    return Places.named(map_name)
 
 
 def session(run: Run = TINY) -> Session:
@@ -86,9 +86,20 @@ def test_another_seed_gives_another_result() -> None:
     assert not np.array_equal(first.last_weights, second.last_weights)
 
 
+def test_lanes_reach_as_far_as_the_sensor_of_each_scenario_sees() -> None:
+    asked: list[float] = []
+
+    def load(reach_m: float) -> Place:
+        asked.append(reach_m)
+        return load_place("four_way", reach_m=reach_m)
+
+    Session(replace(TINY, scenario="base,demo_light"), [Places(load)], initial_weights(3))
+    assert asked == [70.0, 100.0]
+
+
 def test_a_run_on_maps_and_scenarios_resumes_to_the_identical_result(tmp_path: Path) -> None:
     both = replace(TINY, map_name="four_way,t_junction", scenario="base,dense_traffic")
-    places = [place(), load_place("t_junction")]
+    places = [place(), place("t_junction")]
     whole, begun, resumed = (Session(both, places, initial_weights(3)) for _ in range(3))
     list(whole.run())
     next(begun.run())
@@ -139,7 +150,7 @@ def test_exported_policy_drives_as_validation_said(tmp_path: Path) -> None:
     list(one.run())
     file = load_policy_file(RunFolder(tmp_path, TINY).finish(one, "tiny"))
     policy = LearnedPolicy(file.module, file.name, file.sha256)
-    simulation = place().simulation(load_scenario("base"), 5)
+    simulation = place().usual.simulation(load_scenario("base"), 5)
     driven = drive(simulation, policy, fixed_seeds(VALIDATION_SEEDS, 5))
     assert one.best is not None
     assert Score.of([driven]) == one.best.score
@@ -214,7 +225,7 @@ def test_the_vehicle_decides_as_training_under_the_supervisor_does() -> None:
     weights[-1] += 1.0  # such as to prefer Fast by far, and be overruled often
     learner = Learner(SUPERVISED.config.learner, weights)
     vehicle = Supervisor(StopsAtGoal(LearnedPolicy(network_of(weights), "fast", "")))
-    simulation = place().simulation(load_scenario("dense_traffic"), 16)
+    simulation = place().usual.simulation(load_scenario("dense_traffic"), 16)
     environment = BatchEnvironment(
         simulation, StateEncoder(), reward_named("progress"), RiskConfig(), 0, guard=Guard()
     )
@@ -249,7 +260,7 @@ def test_exported_supervised_policy_drives_as_validation_said(tmp_path: Path) ->
     list(one.run())
     file = load_policy_file(RunFolder(tmp_path, SUPERVISED).finish(one, "tiny"))
     policy = Supervisor(LearnedPolicy(file.module, file.name, file.sha256))
-    simulation = place().simulation(load_scenario("base"), 5, "tracked")
+    simulation = place().usual.simulation(load_scenario("base"), 5, "tracked")
     driven = drive(simulation, policy, fixed_seeds(VALIDATION_SEEDS, 5))
     assert one.best is not None
     assert Score.of([driven]) == one.best.score

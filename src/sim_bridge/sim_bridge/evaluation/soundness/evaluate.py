@@ -10,8 +10,8 @@ from rich.console import Console
 
 from risk_dqn_planner.errors import ConfigurationError, UnknownPolicyError
 from risk_dqn_planner.safety.assumptions import SafetyAssumptions
-from sim_bridge.environment.place import load_place
-from sim_bridge.evaluation.campaign import Campaign, Places, versions
+from sim_bridge.environment.place import Places
+from sim_bridge.evaluation.campaign import Campaign, versions
 from sim_bridge.evaluation.progress import progress_on
 from sim_bridge.evaluation.rollout import Clairvoyant, Contestant
 from sim_bridge.evaluation.soundness.cells import (
@@ -95,9 +95,7 @@ class _Work:
     def campaign(self, map_name: str, episodes: int) -> Campaign:
         """Return what drives so many episodes on a map, the first ones compared with the limits."""
         if map_name not in self.places:
-            self.places[map_name] = Places(
-                lambda reach_m: load_place(map_name, sensor_range_m=reach_m)
-            )
+            self.places[map_name] = Places.named(map_name)
         store = Store(self.plan.output / "cells")
         return Campaign(self.places[map_name], episodes, store, self.plan.limited)
 

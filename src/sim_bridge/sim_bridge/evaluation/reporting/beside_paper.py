@@ -12,8 +12,6 @@ from sim_bridge.evaluation.reporting.figures import (
     TRAINING_PNG,
 )
 from sim_bridge.evaluation.reporting.findings import (
-    HIGH,
-    Finding,
     about_actions,
     about_challenges,
     about_ranges,
@@ -35,6 +33,7 @@ from sim_bridge.evaluation.reporting.selection import (
     reader,
     spread,
 )
+from sim_bridge.evaluation.reporting.verdicts import HIGH, Finding
 
 _INTRODUCTION = """\
 ## Beside the paper

@@ -4,7 +4,6 @@
 from collections.abc import Sequence
 
 from sim_bridge.evaluation.cells import RANGES_M, TRAFFIC
-from sim_bridge.evaluation.reporting.findings import Evidence
 from sim_bridge.evaluation.reporting.markdown import NOTHING, as_speed, bare
 from sim_bridge.evaluation.reporting.paper_values import (
     ACTION_USAGE,
@@ -15,6 +14,7 @@ from sim_bridge.evaluation.reporting.paper_values import (
     RULE_BASED,
 )
 from sim_bridge.evaluation.reporting.selection import Line
+from sim_bridge.evaluation.reporting.verdicts import Evidence
 
 _PAGE = """\
 ## Curiosities of the paper

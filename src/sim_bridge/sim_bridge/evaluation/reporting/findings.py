@@ -1,13 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the paper says of its figures, held against our results: each verdict is computed.
-
-A statement holds or not only where the intervals do not overlap; else it is undecided.
-"""
+"""What the paper says of its figures, held against our results: each verdict is computed."""
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
 
-from sim_bridge.evaluation.cells import BASE, CHALLENGES, RANGES_M, TRAFFIC
+from sim_bridge.evaluation.cells import CHALLENGES, RANGES_M
 from sim_bridge.evaluation.reporting.curves import Curve, Curves
 from sim_bridge.evaluation.reporting.markdown import as_percent, as_speed
 from sim_bridge.evaluation.reporting.paper_values import (
@@ -16,96 +12,19 @@ from sim_bridge.evaluation.reporting.paper_values import (
     RULE_BASED,
     paper_role,
 )
-from sim_bridge.evaluation.reporting.selection import (
-    Line,
-    Spread,
-    actions_normalised,
-    cell_of,
-    policies,
-    reader,
-    spread,
+from sim_bridge.evaluation.reporting.selection import Line, Spread
+from sim_bridge.evaluation.reporting.verdicts import (
+    ALIKE,
+    HIGH,
+    NOTHING_LEFT,
+    Evidence,
+    Finding,
+    Verdict,
+    all_above,
+    collected,
+    more,
+    times,
 )
-
-# What counts as high success, as nothing, and as equal.
-HIGH, NOTHING_LEFT, ALIKE = 0.9, 0.05, 0.15
-
-Form = Callable[[float], str]
-
-
-class Verdict(NamedTuple):
-    """holds: None where the data do not decide. numbers: what it rests on, in words."""
-
-    holds: bool | None
-    numbers: str
-
-    def __str__(self) -> str:
-        word = {True: "**yes**", False: "**no**", None: "undecided"}[self.holds]
-        return f"{word}: {self.numbers}"
-
-
-class Finding(NamedTuple):
-    """A statement of the paper with the verdict for each kind of traffic that was driven."""
-
-    statement: str
-    verdicts: dict[str, Verdict]
-
-
-def times(value: float) -> str:
-    """Return a ratio."""
-    return f"{value:.2f} x"
-
-
-def more(ours: Spread | None, other: Spread | None, form: Form) -> Verdict | None:
-    """Return whether one number is above another."""
-    if ours is None or other is None:
-        return None
-    holds = True if ours.low > other.high else False if ours.high < other.low else None
-    # Numbers that are equal to the last digit are not told apart by an interval.
-    if ours.value == other.value:
-        holds = False if ours.low == ours.high else None
-    return Verdict(holds, f"{form(ours.value)} against {form(other.value)}")
-
-
-def against(value: Spread | None, limit: float, form: Form) -> Verdict | None:
-    """Return whether a number is above a fixed one."""
-    return more(value, Spread(limit, limit, limit, 1), form)
-
-
-class Evidence:
-    """The lines of results.json by the paper's roles, in one kind of traffic."""
-
-    def __init__(self, lines: Sequence[Line], traffic: str) -> None:
-        self._lines = lines
-        self.traffic = traffic
-        self._names = {paper_role(policy): policy for policy in policies(lines)}
-
-    def lines(self, role: str, scenario: str = BASE, range_m: float | None = None) -> list[Line]:
-        """Return the lines of a role in a cell, one for each seed."""
-        name = self._names.get(role)
-        return cell_of(self._lines, name, scenario, self.traffic, range_m) if name else []
-
-    def of(
-        self, role: str, key: str, scenario: str = BASE, range_m: float | None = None
-    ) -> Spread | None:
-        """Return a figure of a role in a cell."""
-        return spread(self.lines(role, scenario, range_m), reader(key))
-
-    def actions(self, role: str) -> dict[str, Spread]:
-        """Return the numbers of actions of a role, relative to the rule-based policy."""
-        return actions_normalised(self.lines(role), self.lines(RULE_BASED))
-
-
-def _collected(
-    lines: Sequence[Line], statements: dict[str, Callable[[Evidence], Verdict | None]]
-) -> list[Finding]:
-    """Hold each statement against both kinds of traffic; leave out what nobody has driven."""
-    findings = []
-    for statement, judge in statements.items():
-        judged = {traffic: judge(Evidence(lines, traffic)) for traffic in TRAFFIC}
-        verdicts = {traffic: each for traffic, each in judged.items() if each is not None}
-        if verdicts:
-            findings.append(Finding(statement, verdicts))
-    return findings
 
 
 def about_actions(lines: Sequence[Line]) -> list[Finding]:
@@ -126,7 +45,7 @@ def about_actions(lines: Sequence[Line]) -> list[Finding]:
             evidence.actions(role).get(action), evidence.actions(other).get(action), times
         )
 
-    return _collected(
+    return collected(
         lines,
         {
             "all three drive fast about equally often (collision-aware, risk-aware)": alike,
@@ -171,19 +90,19 @@ def about_challenges(lines: Sequence[Line]) -> list[Finding]:
         for scenario in CHALLENGES
         for name in [scenario.replace("_", " ")]
     }
-    return _collected(lines, {**succeeds, **collides})
+    return collected(lines, {**succeeds, **collides})
 
 
 def about_ranges(lines: Sequence[Line]) -> list[Finding]:
     """The figure of mean speed by sensor range."""
 
     def fails(evidence: Evidence) -> Verdict | None:
-        return _all_above(
+        return all_above(
             [evidence.of(RULE_BASED, "timeout", range_m=RANGES_M[0])], 1.0 - NOTHING_LEFT
         )
 
     def drives(evidence: Evidence) -> Verdict | None:
-        return _all_above(
+        return all_above(
             [evidence.of(RISK_AWARE, "success", range_m=range_m) for range_m in RANGES_M], HIGH
         )
 
@@ -211,7 +130,7 @@ def about_ranges(lines: Sequence[Line]) -> list[Finding]:
         return more(near, far, as_speed)
 
     shorter, longer = (f"{range_m:g} m" for range_m in RANGES_M[1:])
-    return _collected(
+    return collected(
         lines,
         {
             f"the rule fails at {RANGES_M[0]:g} m (share of timeouts)": fails,
@@ -226,16 +145,6 @@ def about_ranges(lines: Sequence[Line]) -> list[Finding]:
     )
 
 
-def _all_above(values: Sequence[Spread | None], limit: float) -> Verdict | None:
-    verdicts = [against(value, limit, as_percent) for value in values]
-    known = [verdict for verdict in verdicts if verdict is not None]
-    if not known or len(known) < len(values):
-        return None
-    holds = [verdict.holds for verdict in known]
-    shown = ", ".join(as_percent(value.value) for value in values if value is not None)
-    return Verdict(False if False in holds else None if None in holds else True, shown)
-
-
 def about_training(curves: Curves) -> list[tuple[str, Verdict]]:
     """The figure of success during training, which the paper draws without numbers."""
     of_role = {paper_role(name): each for name, each in curves.items()}
@@ -247,7 +156,7 @@ def about_training(curves: Curves) -> list[tuple[str, Verdict]]:
     smoother = more(wavering[0], wavering[1], lambda value: f"{100 * value:.1f} points")
     if smoother is not None and min(value.seeds for value in wavering) == 1:
         smoother = smoother._replace(holds=None)  # one seed has no interval
-    converged = _all_above(last, HIGH)
+    converged = all_above(last, HIGH)
     statements = {
         "both rewards converge to high success (risk-aware, collision-aware; last quarter)": (
             converged

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Pieces of Markdown: tables, and numbers with their intervals."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 from sim_bridge.evaluation.reporting.selection import Line, Spread, reader, spread
 
@@ -19,6 +19,13 @@ def text_table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     """Return a table of sentences."""
     lines = (header, ["---"] * len(header), *rows)
     return "\n".join(f"| {' | '.join(line)} |" for line in lines) + "\n"
+
+
+def versions_table(versions: Mapping[str, object]) -> str:
+    """Return the chapter that says what the results of a page were made with."""
+    shown = ("git_revision", "python", "numpy", "numba", "map", "first_seed")
+    rows = [[name, str(versions[name])] for name in shown if name in versions]
+    return f"## Made with\n\n{table(['what', 'version'], rows)}"
 
 
 def folded(title: str, text: str) -> str:

@@ -19,6 +19,7 @@ from sim_bridge.evaluation.reporting.markdown import (
     percent,
     result,
     table,
+    versions_table,
 )
 from sim_bridge.evaluation.reporting.reasons import reasons
 from sim_bridge.evaluation.reporting.selection import Line, cell_of, policies, reader, spread
@@ -59,7 +60,7 @@ def write_report(
         *sections_beside_paper(lines, curves, links),
         _reasons(lines),
         curiosities(lines),
-        _versions(content["versions"]),
+        versions_table(content["versions"]),
     ]
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text("\n".join(part for part in parts if part), encoding="utf-8")
@@ -157,9 +158,3 @@ def _behaviour(lines: Sequence[Line]) -> str:
 def _reasons(lines: Sequence[Line]) -> str:
     told = reasons(lines)
     return f"## Why\n\n{told}" if told else ""
-
-
-def _versions(versions: dict[str, Any]) -> str:
-    shown = ("git_revision", "python", "numpy", "numba", "map", "first_seed")
-    rows = [[name, str(versions[name])] for name in shown if name in versions]
-    return f"## Made with\n\n{table(['what', 'version'], rows)}"

@@ -7,10 +7,10 @@ from typing import NamedTuple
 from sim_bridge.environment.rewards import REWARDS
 from sim_bridge.evaluation.cells import CHALLENGES, RANGES_M, RESPAWNING, TRAFFIC
 from sim_bridge.evaluation.clairvoyant import NAME as CLAIRVOYANT
-from sim_bridge.evaluation.reporting.findings import HIGH, NOTHING_LEFT, Evidence
 from sim_bridge.evaluation.reporting.markdown import as_percent, as_speed
 from sim_bridge.evaluation.reporting.paper_values import COLLISION_AWARE, RISK_AWARE, RULE_BASED
 from sim_bridge.evaluation.reporting.selection import Line, cell_of, policies, reader, spread
+from sim_bridge.evaluation.reporting.verdicts import HIGH, NOTHING_LEFT, Evidence
 
 DENSE, OCCLUDED, NOISE = CHALLENGES[:3]
 

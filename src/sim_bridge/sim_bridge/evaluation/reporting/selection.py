@@ -58,12 +58,17 @@ def reader(key: str) -> Callable[[Line], Line | None]:
     return partial(_read, key)
 
 
+def center_of(value: Line) -> float:
+    """Return the rate of a share, or the mean of whatever else was counted."""
+    return float(value["rate"] if "rate" in value else value["mean"])
+
+
 def spread(lines: Sequence[Line], read: Callable[[Line], Line | None]) -> Spread | None:
     """Average what `read` finds in each line (rate or mean, low, high); None without any."""
     found = [value for value in map(read, lines) if value is not None]
     if not found:
         return None
-    centers = [float(value["rate"] if "rate" in value else value["mean"]) for value in found]
+    centers = [center_of(value) for value in found]
     lows, highs = ([float(value[end]) for value in found] for end in ("low", "high"))
     return Spread(sum(centers) / len(centers), min(lows), max(highs), len(found))
 

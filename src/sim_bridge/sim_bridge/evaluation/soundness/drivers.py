@@ -1,27 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """Who takes part in the set `soundness`, each with the assumptions of the cell it is in."""
 
-from collections.abc import Callable, Mapping
-
 from risk_dqn_planner.policies.base import Policy, StopsAtGoal
-from risk_dqn_planner.policies.fastest_sound import FastestSoundPolicy
 from risk_dqn_planner.policies.loading import load_policy
-from risk_dqn_planner.policies.look_ahead import LookAheadPolicy
 from risk_dqn_planner.policies.supervised import Supervisor
+from risk_dqn_planner.policies.supervised_loading import SOUND as BUILT_IN_SOUND
 from risk_dqn_planner.policies.supervised_loading import is_sound as chooses_sound
 from risk_dqn_planner.safety.assumptions import SafetyAssumptions
 from sim_bridge.evaluation.rollout import Contestant, PolicyContestant
-from sim_bridge.evaluation.soundness.cells import FASTEST_SOUND, LOOK_AHEAD, SOUND
+from sim_bridge.evaluation.soundness.cells import SOUND
 
 _SUPERVISED = "+supervisor"
-
-MakePolicy = Callable[[SafetyAssumptions], Policy]
-
-# Built-in policies that rest on assumptions.
-_ASSUMING: Mapping[str, MakePolicy] = {
-    FASTEST_SOUND: FastestSoundPolicy,
-    LOOK_AHEAD: LookAheadPolicy,
-}
 
 
 def is_sound(name: str) -> bool:
@@ -41,8 +30,8 @@ class Drivers:
         Raises:
             PolicyError: there is none of that name.
         """
-        if name in _ASSUMING:
-            return PolicyContestant(StopsAtGoal(_ASSUMING[name](assumptions)))
+        if name in BUILT_IN_SOUND:
+            return PolicyContestant(StopsAtGoal(BUILT_IN_SOUND[name](assumptions)))
         if name.endswith(_SUPERVISED):
             policy = self._policy(name.removesuffix(_SUPERVISED))
             return PolicyContestant(Supervisor(policy, assumptions=assumptions), name=name)

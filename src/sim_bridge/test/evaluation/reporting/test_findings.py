@@ -10,16 +10,15 @@ from sim_bridge.evaluation.cells import FINITE, RESPAWNING
 from sim_bridge.evaluation.reporting.curiosities import curiosities
 from sim_bridge.evaluation.reporting.curves import Curve
 from sim_bridge.evaluation.reporting.findings import (
-    Finding,
     about_actions,
     about_challenges,
     about_ranges,
     about_training,
-    more,
 )
 from sim_bridge.evaluation.reporting.markdown import as_percent
 from sim_bridge.evaluation.reporting.reasons import reasons
 from sim_bridge.evaluation.reporting.selection import Line, Spread, actions_normalised
+from sim_bridge.evaluation.reporting.verdicts import Finding, more
 from sim_bridge.evaluation.statistics import wilson
 
 

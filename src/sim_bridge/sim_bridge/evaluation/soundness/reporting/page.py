@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from sim_bridge.evaluation.cells import BASE
-from sim_bridge.evaluation.reporting.markdown import folded, table
+from sim_bridge.evaluation.reporting.markdown import folded, table, versions_table
+from sim_bridge.evaluation.reporting.selection import Line
 from sim_bridge.evaluation.soundness.cells import FRONTIER, GOAL, MEMORY, VIOLATED
 from sim_bridge.evaluation.soundness.limits import SOUND_LIMIT
 from sim_bridge.evaluation.soundness.reporting.pictures import draw_frontier
@@ -15,7 +16,6 @@ from sim_bridge.evaluation.soundness.reporting.tables import (
     LIMITS,
     SPEED_WANTED,
     SUCCESS_WANTED,
-    Line,
     by_map,
     by_traffic,
     collisions_in_all,
@@ -230,8 +230,6 @@ def _broken(line: Line) -> str:
 
 
 def _versions(versions: dict[str, Any]) -> str:
-    shown = ("git_revision", "python", "numpy", "numba", "map", "first_seed")
-    rows = [[name, str(versions[name])] for name in shown if name in versions]
     missing = versions.get("missing", [])
     note = f"\nNot in this version: {', '.join(missing)}.\n" if missing else ""
-    return f"## Made with\n\n{table(['what', 'version'], rows)}{note}"
+    return versions_table(versions) + note

@@ -9,10 +9,10 @@ from matplotlib.figure import Figure
 
 from sim_bridge.evaluation.clairvoyant import NAME as CLAIRVOYANT
 from sim_bridge.evaluation.reporting.plotting import WIDTH_IN, colors, save
+from sim_bridge.evaluation.reporting.selection import Line, center_of
 from sim_bridge.evaluation.soundness.limits import SOUND_LIMIT
 from sim_bridge.evaluation.soundness.reporting.tables import (
     LIMITS,
-    Line,
     by_traffic,
     policies_of,
     top_speed,
@@ -41,15 +41,11 @@ def draw_frontier(lines: Sequence[Line], folder: Path) -> list[Path]:
     return [save(figure, folder / FRONTIER_PNG)]
 
 
-def _center(value: Line) -> float:
-    return float(value["rate"] if "rate" in value else value["mean"])
-
-
 def _panel(axes: Axes, lines: Sequence[Line], key: str, factor: float, label: str) -> None:
     shades = colors(policies_of(lines))
     for policy, color in shades.items():
         own = [line for line in lines if line["policy"] == policy and line[key] is not None]
-        across = [factor * _center(line[key]) for line in own]
+        across = [factor * center_of(line[key]) for line in own]
         up = [100 * max(line["collision"]["rate"], _LEAST) for line in own]
         ends = [
             [100 * max(line["collision"][end], _LEAST) for line in own] for end in ("low", "high")
@@ -62,7 +58,7 @@ def _panel(axes: Axes, lines: Sequence[Line], key: str, factor: float, label: st
     for line in lines:
         if line["policy"] in LIMITS and line[key] is not None:
             axes.axvline(
-                factor * _center(line[key]), color="black", linewidth=1.0,
+                factor * center_of(line[key]), color="black", linewidth=1.0,
                 linestyle=_STYLES[line["policy"]], label=line["policy"].replace("_", " "),
             )  # fmt: skip
     axes.set(xlabel=label, ylabel="collisions [%]", yscale="log")

@@ -2,14 +2,13 @@
 """Tables of the set `soundness`, from the lines of its results.json."""
 
 from collections.abc import Callable, Iterable, Sequence
-from typing import Any
 
 from risk_dqn_planner.safety.assumptions import NO_CAP_MPS
 from sim_bridge.evaluation.clairvoyant import NAME as CLAIRVOYANT
 from sim_bridge.evaluation.reporting.markdown import NOTHING, OUTCOMES, table
+from sim_bridge.evaluation.reporting.selection import Line, center_of
 from sim_bridge.evaluation.soundness.limits import SOUND_LIMIT
 
-Line = dict[str, Any]
 LIMITS = (CLAIRVOYANT, SOUND_LIMIT)
 # What the project asks of a sound policy, relative to the sound limit.
 SUCCESS_WANTED, SPEED_WANTED = 0.97, 0.95
@@ -48,9 +47,8 @@ def with_interval(value: Line | None, factor: float = 1.0, digits: int = 1) -> s
     """Return a share or mean with its interval."""
     if value is None:
         return NOTHING
-    center = value["rate"] if "rate" in value else value["mean"]
     low, high = factor * value["low"], factor * value["high"]
-    return f"{factor * center:.{digits}f} [{low:.{digits}f}, {high:.{digits}f}]"
+    return f"{factor * center_of(value):.{digits}f} [{low:.{digits}f}, {high:.{digits}f}]"
 
 
 def outcome(line: Line | None) -> str:

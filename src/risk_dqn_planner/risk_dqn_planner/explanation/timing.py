@@ -84,7 +84,7 @@ def arrival_time(s: Situations, whom: Pair, by: Yardstick) -> float:
         vehicle_arrival(
             float(s.vehicle_distance_m[0, vehicle]),
             float(s.lane_zone_m[0, lane]),
-            float(s.vehicle_speed_mps[0, vehicle]),
+            max(float(s.vehicle_speed_mps[0, vehicle]) + by.numbers.speed_error_mps, 0.0),
             float(s.lane_speed_limit_mps[0, lane]),
             by.numbers,
         )

@@ -175,7 +175,7 @@ class LookAheadPolicy:
             situations,
             p,
             c,
-            self._guard.reacted_m,
+            self._guard.known,
             self._sight.corner_m(situations, restart),
             self._guard.sound(check),
             self._guard.in_force,

@@ -33,6 +33,7 @@ from risk_dqn_planner.safety.assumptions import SafetyAssumptions, SafetyNumbers
 from risk_dqn_planner.safety.course import begin_course
 from risk_dqn_planner.safety.guard import Guard
 from risk_dqn_planner.safety.joint_check import ACTIONS, JointCheck, foresee, judge, target_of
+from risk_dqn_planner.safety.known import Known
 from risk_dqn_planner.situation.situations import Booleans, Floats, Integers, Situations
 
 Inputs = NDArray[np.float32]
@@ -57,7 +58,7 @@ class OutlookConfig:
     periods: int = 8
     most_s: float = 4.0
     most_m: float = 40.0
-    nearest_corner_m: float = 2.5
+    nearest_corner_m: float = 2.0
 
     def __post_init__(self) -> None:
         if self.periods < 1:
@@ -84,14 +85,14 @@ class Views(NamedTuple):
     """What one look at B situations found.
 
     inputs (B, E): for the network. sound (B, 3); check: the joint check. in_force (B,): the action
-    before; reacted_m, corner_m (B, M): as the look-ahead search takes them.
+    before; known, corner_m (B, M): as the look-ahead search takes them.
     """
 
     inputs: Inputs
     sound: Booleans
     check: JointCheck
     in_force: Integers
-    reacted_m: Floats
+    known: Known
     corner_m: Floats
 
 
@@ -121,7 +122,7 @@ class Outlook:
             sound=self._guard.sound(check),
             check=check,
             in_force=self._guard.in_force,
-            reacted_m=self._guard.reacted_m,
+            known=self._guard.known,
             corner_m=self._sight.corner_m(situations, restart),
         )
         look_into(
@@ -130,7 +131,7 @@ class Outlook:
             c,
             self.config.most_s,
             self.config.most_m,
-            views.reacted_m,
+            views.known,
             views.corner_m,
             views.sound,
             views.in_force,
@@ -158,7 +159,7 @@ def look_into(
     c: SearchNumbers,
     most_s: float,
     most_m: float,
-    reacted_m: Floats,
+    known: Known,
     corner_m: Floats,
     sound: Booleans,
     in_force: Integers,
@@ -170,16 +171,16 @@ def look_into(
     arrival_s, who = np.empty(lanes), np.empty(lanes, dtype=np.int64)
     later_s = np.empty((WAYS_TO_WAIT, periods))
     for row in range(s.ego_speed_mps.shape[0]):
-        foresee(s, row, p, arrival_s, who)
+        foresee(s, row, known, p, arrival_s, who)
         now_mps = max(s.ego_speed_mps[row], 0.0)
         before_mps = target_of(in_force[row], p)
         for action in range(ACTIONS):
             course = begin_course(now_mps, before_mps, target_of(action, p), p)
-            going = judge(s, row, course, arrival_s, who, reacted_m, p)
+            going = judge(s, row, course, arrival_s, who, known, p)
             inputs[row, _IN_FORCE + action] = 1.0 if in_force[row] == action else 0.0
             inputs[row, _SOUND + action] = 1.0 if sound[row, action] else 0.0
             inputs[row, _GOING + action] = share_of(going.margin_s, most_s)
-        t = Task(s, row, p, c, reacted_m, corner_m, sound, in_force)
+        t = Task(s, row, p, c, known, corner_m, sound, in_force)
         place = next_place(t, w)
         tell_place(place, most_m, inputs[row, _PLACE:_LATER])
         forecast(t, place, periods, w, later_s)

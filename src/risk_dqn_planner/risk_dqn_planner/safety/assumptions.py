@@ -37,6 +37,7 @@ class SafetyNumbers(NamedTuple):
     leader_down_mps2: float
     speed_error_mps: float
     position_error_m: float
+    period_error_s: float
 
 
 @dataclass(frozen=True)
@@ -119,6 +120,13 @@ class SafetyAssumptions:
                   "than this [m]",
                   "minimum": 0.0, "maximum": 20.0},
     )  # fmt: skip
+    period_error_s: float = field(
+        default=5.0,
+        metadata={"description": "The perceptions of successive decisions are a decision period "
+                  "apart but for this; if it is less than the period, speeds are bounded by the "
+                  "ways covered in between as well [s]",
+                  "minimum": 0.0, "maximum": 5.0},
+    )  # fmt: skip
     ego: EgoLimits = field(default_factory=EgoLimits)
     traffic: TrafficLimits = field(default_factory=TrafficLimits)
     vehicle: VehicleDimensions = field(default_factory=VehicleDimensions)
@@ -129,7 +137,7 @@ class SafetyAssumptions:
         for name in (
             "actuation_delay_s", "hidden_top_speed_mps", "safe_gap_s", "zone_margin_m",
             "clearance_m", "follower_reaction_s", "follower_gap_m", "speed_error_mps",
-            "position_error_m",
+            "position_error_m", "period_error_s",
         ):  # fmt: skip
             _require(self, name, getattr(self, name) >= 0.0, "0 or more")
         require_positive(self.ego)
@@ -164,6 +172,7 @@ class SafetyAssumptions:
             leader_down_mps2=self.leader_braking_mps2,
             speed_error_mps=self.speed_error_mps,
             position_error_m=self.position_error_m,
+            period_error_s=self.period_error_s,
         )
 
 

@@ -7,28 +7,34 @@ from risk_dqn_planner.safety.assumptions import SafetyAssumptions
 from risk_dqn_planner.safety.commitment import Commitments
 from risk_dqn_planner.safety.familiarity import Familiarity
 from risk_dqn_planner.safety.joint_check import JointCheck, joint_check
-from risk_dqn_planner.situation.situations import Booleans, Floats, Integers, Situations
+from risk_dqn_planner.safety.known import Known
+from risk_dqn_planner.safety.speeds import SpeedBounds
+from risk_dqn_planner.situation.situations import Booleans, Integers, Situations
 
 
 class Guard:
     """For each decision call `look`, choose, and call `decided`.
 
     Where nothing is admissible, `otherwise` is what was verified last: sound all the same.
-    Public for reading: in_force (B,) and reacted_m (B, M), as in `joint_check`, of the last look.
+    Public for reading: in_force (B,) and known, as in `joint_check`, of the last look.
     """
 
     def __init__(self, assumptions: SafetyAssumptions | None = None) -> None:
         self.assumptions = assumptions or SafetyAssumptions()
         self._commitments = Commitments()
         self._familiarity = Familiarity(self.assumptions)
+        self._speeds = SpeedBounds(self.assumptions)
         self.in_force: Integers = np.empty(0, dtype=np.int64)
-        self.reacted_m: Floats = np.empty((0, 0))
+        self.known = Known(*(np.empty((0, 0)) for _ in Known._fields))
 
     def look(self, situations: Situations, restart: Booleans) -> JointCheck:
         """Check the actions of B situations; `restart` (B,) marks where the memory is void."""
         self.in_force = self._commitments.in_force(restart)
-        self.reacted_m = self._familiarity.reacted_m(situations, restart)
-        return joint_check(situations, self.assumptions, self.in_force, self.reacted_m)
+        self.known = Known(
+            self._familiarity.reacted_m(situations, restart),
+            *self._speeds.look(situations, restart),
+        )
+        return joint_check(situations, self.assumptions, self.in_force, self.known)
 
     def otherwise(self) -> Integers:
         """Return the action (B,) that carries on with the manoeuvre verified last."""
@@ -51,6 +57,7 @@ class Guard:
         """
         self._commitments.keep(rows)
         self._familiarity.keep(rows)
+        self._speeds.keep(rows)
 
     @property
     def periods(self) -> Integers:

@@ -24,6 +24,7 @@ from risk_dqn_planner.safety.course import (
     time_at,
     with_manoeuvre,
 )
+from risk_dqn_planner.safety.known import Known, at_first_sight
 from risk_dqn_planner.safety.merging import merging_margin
 from risk_dqn_planner.safety.others import NOTHING, earliest_arrivals
 from risk_dqn_planner.situation.situations import Booleans, Floats, Integers, Situations
@@ -71,15 +72,14 @@ def joint_check(
     situations: Situations,
     assumptions: SafetyAssumptions,
     in_force: NDArray[np.int64] | None = None,
-    reacted_m: Floats | None = None,
+    known: Known | None = None,
 ) -> JointCheck:
     """Return for each situation which actions are admissible, and why.
 
     in_force (B,): the action before, carried on during the actuation delay; Stop by default.
-    reacted_m (B, M): vehicles of merging lanes no further from their zone's centre than this have
-    had the ego in their lane, and in sight, for the reaction time; nobody has by default.
+    known: what was learnt before; by default this is the first look.
     """
-    batch, lanes = situations.lane_mask.shape
+    batch, p = len(situations.lane_mask), assumptions.numbers()
     shape = (batch, ACTIONS)
     result = JointCheck(
         np.zeros(shape, dtype=np.bool_),
@@ -90,9 +90,9 @@ def joint_check(
     )
     check_into(
         situations,
-        assumptions.numbers(),
+        p,
         np.zeros(batch, dtype=np.int64) if in_force is None else in_force,
-        np.full((batch, lanes), -np.inf) if reacted_m is None else reacted_m,
+        at_first_sight(situations, p) if known is None else known,
         result,
     )
     return result
@@ -103,14 +103,14 @@ def check_into(
     s: Situations,
     p: SafetyNumbers,
     in_force: Integers,
-    reacted_m: Floats,
+    known: Known,
     result: JointCheck,
 ) -> None:
     """Fill `result` row by row."""
     lanes = s.lane_mask.shape[1]
     arrival_s, who = np.empty(lanes), np.empty(lanes, dtype=np.int64)
     for row in range(s.ego_speed_mps.shape[0]):
-        last_m, merging = foresee(s, row, p, arrival_s, who)
+        last_m, merging = foresee(s, row, known, p, arrival_s, who)
         for action in range(ACTIONS):
             course = begin_course(
                 max(s.ego_speed_mps[row], 0.0),
@@ -118,9 +118,7 @@ def check_into(
                 target_of(action, p),
                 p,
             )
-            periods, verdict = vindicate(
-                s, row, course, arrival_s, who, reacted_m, last_m, merging, p
-            )
+            periods, verdict = vindicate(s, row, course, arrival_s, who, known, last_m, merging, p)
             result.admissible[row, action] = periods != NO_MANOEUVRE
             result.periods[row, action] = periods
             result.margin_s[row, action] = verdict.margin_s
@@ -138,7 +136,7 @@ def target_of(action: int, p: SafetyNumbers) -> float:
 
 @kernel
 def foresee(
-    s: Situations, row: int, p: SafetyNumbers, arrival_s: Floats, who: Integers
+    s: Situations, row: int, known: Known, p: SafetyNumbers, arrival_s: Floats, who: Integers
 ) -> tuple[float, bool]:
     """Fill when anyone may be in each crossing zone (M,), and who.
 
@@ -151,7 +149,7 @@ def foresee(
         end_m = s.lane_ego_distance_m[row, lane] + 0.5 * s.lane_ego_zone_m[row, lane]
         last_m = max(last_m, end_m + p.zone_margin_m)
         merging |= s.lane_merging[row, lane]
-    earliest_arrivals(s, row, p, arrival_s, who)
+    earliest_arrivals(s, row, known, p, arrival_s, who)
     return last_m, merging
 
 
@@ -162,7 +160,7 @@ def vindicate(
     course: Course,
     arrival_s: Floats,
     who: Integers,
-    reacted_m: Floats,
+    known: Known,
     last_m: float,
     merging: bool,
     p: SafetyNumbers,
@@ -172,10 +170,10 @@ def vindicate(
     Without one, the verdict is that of going.
     """
     braking = with_manoeuvre(course, BRAKE, p)
-    verdict = judge(s, row, braking, arrival_s, who, reacted_m, p)
+    verdict = judge(s, row, braking, arrival_s, who, known, p)
     if verdict.margin_s >= -_ROUNDING:
         return BRAKE, verdict
-    going = judge(s, row, course, arrival_s, who, reacted_m, p)
+    going = judge(s, row, course, arrival_s, who, known, p)
     if going.margin_s >= -_ROUNDING:
         return GO, going
     # Behind all zones a rest is of use only where going on for ever fails, behind a leader.
@@ -184,7 +182,7 @@ def vindicate(
         stopping = with_manoeuvre(course, periods, p)
         if stopping.rest_m > bound_m + _ROUNDING:
             break
-        verdict = judge(s, row, stopping, arrival_s, who, reacted_m, p)
+        verdict = judge(s, row, stopping, arrival_s, who, known, p)
         if verdict.margin_s >= -_ROUNDING:
             return periods, verdict
         if stopping.rest_m > last_m:
@@ -199,7 +197,7 @@ def judge(
     c: Course,
     arrival_s: Floats,
     who: Integers,
-    reacted_m: Floats,
+    known: Known,
     p: SafetyNumbers,
 ) -> Verdict:
     """Return the least margin of a course over all lanes."""
@@ -208,7 +206,7 @@ def judge(
         if not s.lane_mask[row, lane]:
             continue
         if s.lane_merging[row, lane]:
-            margin_s, vehicle, within_m = merging_verdict(s, row, lane, c, reacted_m, p)
+            margin_s, vehicle, within_m = merging_verdict(s, row, lane, c, known, p)
         else:
             vehicle = who[lane]
             margin_s, within_m = crossing_verdict(s, row, lane, c, arrival_s[lane], p)
@@ -240,7 +238,7 @@ def crossing_verdict(
 
 @kernel
 def merging_verdict(
-    s: Situations, row: int, lane: int, c: Course, reacted_m: Floats, p: SafetyNumbers
+    s: Situations, row: int, lane: int, c: Course, known: Known, p: SafetyNumbers
 ) -> tuple[float, int, float]:
     """Return the room left at a merging lane as time, whose it is, and within what way to rest."""
     start_m = s.lane_ego_distance_m[row, lane] - 0.5 * s.lane_ego_zone_m[row, lane]
@@ -249,5 +247,5 @@ def merging_verdict(
         return math.inf, NOTHING, before_m
     if c.rest_m <= start_m:
         return -math.inf, NOTHING, before_m
-    room_m, vehicle, within_m = merging_margin(s, row, lane, reacted_m, c, p, start_m)
+    room_m, vehicle, within_m = merging_margin(s, row, lane, known, c, p, start_m)
     return room_m / p.fast_mps, vehicle, within_m

@@ -12,8 +12,9 @@ from risk_dqn_planner.compiled import kernel
 from risk_dqn_planner.risk.rewards import leader_gap
 from risk_dqn_planner.safety.assumptions import SafetyNumbers
 from risk_dqn_planner.safety.course import Course, speed_at, time_at, way_at
-from risk_dqn_planner.safety.others import advance, hidden_speed, start_speed, top_speed
-from risk_dqn_planner.situation.situations import Floats, Situations
+from risk_dqn_planner.safety.known import Known
+from risk_dqn_planner.safety.others import advance, hidden_speed, top_speed
+from risk_dqn_planner.situation.situations import Situations
 
 
 @kernel
@@ -73,7 +74,7 @@ def merging_margin(
     s: Situations,
     row: int,
     lane: int,
-    reacted_m: Floats,
+    known: Known,
     c: Course,
     p: SafetyNumbers,
     start_m: float,
@@ -82,7 +83,7 @@ def merging_margin(
 
     For an ego that enters the zone after `start_m`. Whose: -1 for a hidden vehicle. Where: at
     rest no further than this from now on nobody would forbid it; infinity if nobody does.
-    reacted_m (B, M): see `joint_check`.
+    known: see `joint_check`.
     """
     enter_s = time_at(c, start_m, p)
     least_m, who = hidden_margin(s, row, lane, c, enter_s, p), -1
@@ -91,7 +92,8 @@ def merging_margin(
     needed_m = p.between_centres_m + p.clearance_m
     # Taken out before the loop: reading fields inside costs a count of references each time.
     mask, lanes = s.vehicle_mask, s.vehicle_lane
-    distance_m, speed_mps = s.vehicle_distance_m, s.vehicle_speed_mps
+    distance_m, reacted_m = s.vehicle_distance_m, known.reacted_m[row, lane]
+    low_mps, high_mps = known.low_mps, known.high_mps
     ego_m, ego_zone_m = s.lane_ego_distance_m[row, lane], s.lane_ego_zone_m[row, lane]
     zone_m, limit_mps = s.lane_zone_m[row, lane], s.lane_speed_limit_mps[row, lane]
     for vehicle in range(mask.shape[1]):
@@ -99,12 +101,12 @@ def merging_margin(
             continue
         now_m = distance_m[row, vehicle]
         ahead_m = leader_gap(ego_m, ego_zone_m, now_m, zone_m)
-        slow_mps = max(float(speed_mps[row, vehicle]) - p.speed_error_mps, 0.0)
+        slow_mps = float(low_mps[row, vehicle])
         margin_m = leader_margin(c, ahead_m - p.position_error_m, slow_mps, p)
-        mps = start_speed(speed_mps[row, vehicle], p)
+        mps = float(high_mps[row, vehicle])
         top_mps = top_speed(limit_mps, mps, p)
         reaction_s, gap_m = p.reaction_s, p.follower_gap_m
-        if now_m + p.position_error_m <= reacted_m[row, lane]:
+        if now_m + p.position_error_m <= reacted_m:
             reaction_s, gap_m = 0.0, p.clearance_m
         behind_m = ahead_m + p.position_error_m
         # Who is too far behind to matter more than others needs no closer look.

@@ -12,15 +12,10 @@ from risk_dqn_planner.compiled import kernel
 from risk_dqn_planner.risk.motion import distance_after, speed_after
 from risk_dqn_planner.risk.rewards import reach_time
 from risk_dqn_planner.safety.assumptions import SafetyNumbers
+from risk_dqn_planner.safety.known import Known
 from risk_dqn_planner.situation.situations import Floats, Integers, Situations
 
 NOTHING = -1
-
-
-@kernel
-def start_speed(measured_mps: float, p: SafetyNumbers) -> float:
-    """Return the highest speed that a perceived vehicle may have; nobody drives backwards."""
-    return max(measured_mps + p.speed_error_mps, 0.0)
 
 
 @kernel
@@ -47,22 +42,24 @@ def hidden_arrival(s: Situations, row: int, lane: int, p: SafetyNumbers) -> floa
 
 @kernel
 def vehicle_arrival(
-    now_m: float, zone_m: float, measured_mps: float, limit_mps: float, p: SafetyNumbers
+    now_m: float, zone_m: float, high_mps: float, limit_mps: float, p: SafetyNumbers
 ) -> float:
-    """Return when a perceived vehicle may reach its zone at the earliest, infinity once it left."""
+    """Return when a vehicle may reach its zone at the earliest, infinity once it left.
+
+    high_mps: the highest speed that it may have now.
+    """
     if now_m + 0.5 * zone_m <= -p.position_error_m:
         return math.inf
-    mps = start_speed(measured_mps, p)
-    top_mps = top_speed(limit_mps, mps, p)
+    top_mps = top_speed(limit_mps, high_mps, p)
     arrival_s: float = reach_time(
-        now_m - p.position_error_m, zone_m, mps, p.others_up_mps2, top_mps
+        now_m - p.position_error_m, zone_m, high_mps, p.others_up_mps2, top_mps
     )
     return arrival_s
 
 
 @kernel
 def earliest_arrivals(
-    s: Situations, row: int, p: SafetyNumbers, arrival_s: Floats, who: Integers
+    s: Situations, row: int, known: Known, p: SafetyNumbers, arrival_s: Floats, who: Integers
 ) -> None:
     """Fill when anyone may reach each crossing lane's zone (M,), and the vehicle's index.
 
@@ -75,7 +72,7 @@ def earliest_arrivals(
             arrival_s[lane] = hidden_arrival(s, row, lane, p)
     # Taken out before the loop: reading fields inside costs a count of references each time.
     mask, lanes, ids, merging = s.vehicle_mask, s.vehicle_lane, s.vehicle_id, s.lane_merging
-    distance_m, speed_mps = s.vehicle_distance_m, s.vehicle_speed_mps
+    distance_m, high_mps = s.vehicle_distance_m, known.high_mps
     zone_m, limit_mps = s.lane_zone_m, s.lane_speed_limit_mps
     for vehicle in range(mask.shape[1]):
         lane = lanes[row, vehicle]
@@ -84,7 +81,7 @@ def earliest_arrivals(
         own_s = vehicle_arrival(
             distance_m[row, vehicle],
             zone_m[row, lane],
-            speed_mps[row, vehicle],
+            high_mps[row, vehicle],
             limit_mps[row, lane],
             p,
         )

@@ -16,6 +16,7 @@ from risk_dqn_planner.policies.base import Action
 from risk_dqn_planner.safety.assumptions import SafetyAssumptions
 from risk_dqn_planner.safety.course import BRAKE, GO
 from risk_dqn_planner.safety.joint_check import JointCheck, joint_check
+from risk_dqn_planner.safety.known import at_first_sight
 from risk_dqn_planner.situation.situations import Situations
 
 Make = Callable[..., Situations]
@@ -27,7 +28,9 @@ def merging(ego_m: float, hidden_m: float = FAR) -> dict[str, Any]:
 
 
 def check(s: Situations, reacted_m: float = -np.inf, **changes: Any) -> JointCheck:  # noqa: ANN401
-    return joint_check(s, SafetyAssumptions(**changes), None, np.array([[reacted_m]]))
+    assumptions = SafetyAssumptions(**changes)
+    known = at_first_sight(s, assumptions.numbers())._replace(reacted_m=np.array([[reacted_m]]))
+    return joint_check(s, assumptions, None, known)
 
 
 @pytest.mark.parametrize(("hidden_m", "expected"), [(23.6, True), (23.5, False)])

@@ -28,7 +28,7 @@ class Advisor:
             situations,
             self._assumptions,
             self._config,
-            views.reacted_m,
+            views.known,
             views.corner_m,
             views.sound,
             views.in_force,

@@ -77,7 +77,7 @@ def forecast(t: Task, place: Place, periods: int, w: Work, margin_s: Floats) -> 
                 mps = reached(now_mps, target_mps, time_s, p)
             look_from(t, k, way_m, w)
             course = begin_course(mps, target_mps, p.fast_mps, p)
-            verdict = judge(w.ahead, k, course, w.arrival_s, w.who, w.reacted_m, p)
+            verdict = judge(w.ahead, k, course, w.arrival_s, w.who, w.known, p)
             margin_s[wait, k - 1] = verdict.margin_s
 
 

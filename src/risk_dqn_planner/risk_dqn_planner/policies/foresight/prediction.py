@@ -9,6 +9,7 @@ from risk_dqn_planner.policies.foresight.task import Task, Work
 from risk_dqn_planner.risk.rewards import leader_gap
 from risk_dqn_planner.safety.joint_check import foresee
 from risk_dqn_planner.safety.others import NOTHING, hidden_arrival
+from risk_dqn_planner.safety.speeds import error_ahead
 
 
 @kernel
@@ -19,14 +20,20 @@ def predict(t: Task, k: int, w: Work) -> tuple[float, bool]:
     """
     s, row, a = t.s, t.row, w.ahead
     time_s = k * t.p.period_s
+    above_mps = error_ahead(t.p)
     for i in range(s.vehicle_mask.shape[1]):
         a.vehicle_mask[k, i] = s.vehicle_mask[row, i]
         if s.vehicle_mask[row, i]:
-            mps = max(s.vehicle_speed_mps[row, i], 0.0)
+            mps = t.known.likely_mps[row, i]
             a.vehicle_id[k, i] = s.vehicle_id[row, i]
             a.vehicle_lane[k, i] = s.vehicle_lane[row, i]
             a.vehicle_speed_mps[k, i] = mps
             a.vehicle_distance_m[k, i] = s.vehicle_distance_m[row, i] - mps * time_s
+            w.known.low_mps[k, i] = max(mps - t.p.speed_error_mps, 0.0)
+            w.known.high_mps[k, i] = mps + above_mps
+            if k == 0:
+                w.known.low_mps[k, i] = t.known.low_mps[row, i]
+                w.known.high_mps[k, i] = t.known.high_mps[row, i]
     for m in range(s.lane_mask.shape[1]):
         a.lane_mask[k, m] = s.lane_mask[row, m]
         a.lane_merging[k, m] = s.lane_merging[row, m]
@@ -36,8 +43,8 @@ def predict(t: Task, k: int, w: Work) -> tuple[float, bool]:
         a.lane_ego_distance_m[k, m] = s.lane_ego_distance_m[row, m]
         # Where hidden ones may be depends on what the ego sees by then, see `look_from`.
         a.lane_hidden_distance_m[k, m] = math.inf
-        w.reacted_m[k, m] = t.reacted_m[row, m]
-    last_m, merging = foresee(a, k, t.p, w.of_vehicles_s, w.nearest)
+        w.known.reacted_m[k, m] = t.known.reacted_m[row, m]
+    last_m, merging = foresee(a, k, w.known, t.p, w.of_vehicles_s, w.nearest)
     return last_m, merging
 
 

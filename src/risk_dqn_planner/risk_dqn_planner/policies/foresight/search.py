@@ -38,6 +38,7 @@ from risk_dqn_planner.safety.joint_check import (
     target_of,
     vindicate,
 )
+from risk_dqn_planner.safety.known import Known
 from risk_dqn_planner.safety.others import NOTHING
 from risk_dqn_planner.situation.situations import Booleans, Floats, Integers, Situations
 
@@ -50,7 +51,7 @@ def search_into(
     s: Situations,
     p: SafetyNumbers,
     c: SearchNumbers,
-    reacted_m: Floats,
+    known: Known,
     corner_m: Floats,
     sound: Booleans,
     in_force: Integers,
@@ -60,7 +61,7 @@ def search_into(
 ) -> None:
     """Fill the first action (B,) of the best plans, and who forbids to go at once (B, 2)."""
     for row in range(s.ego_speed_mps.shape[0]):
-        search(Task(s, row, p, c, reacted_m, corner_m, sound, in_force), w)
+        search(Task(s, row, p, c, known, corner_m, sound, in_force), w)
         action[row] = w.best.action[0]
         critical[row] = w.best.critical
 
@@ -133,7 +134,7 @@ def follow(
             cost_s = before_s + (t.c.switching_s if action != last else 0.0)
             first = action if k == 0 else w.nodes.first[side, i]
             if action == _FAST:
-                going = judge(w.ahead, k, course, w.arrival_s, w.who, w.reacted_m, p)
+                going = judge(w.ahead, k, course, w.arrival_s, w.who, w.known, p)
                 if going.margin_s >= -_ROUNDING:
                     offer(cost_s + least_s, first, w.best)
                     break
@@ -141,7 +142,7 @@ def follow(
             stops_m = course.m2 + 0.5 * course.v2 * course.v2 / p.ego_down_mps2
             if k > 0 and stops_m > free_m - way_m:
                 periods, _ = vindicate(
-                    w.ahead, k, course, w.arrival_s, w.who, w.reacted_m, last_m - way_m, merging, p
+                    w.ahead, k, course, w.arrival_s, w.who, w.known, last_m - way_m, merging, p
                 )
                 if periods == NO_MANOEUVRE:
                     continue

@@ -8,6 +8,7 @@ import numpy as np
 
 from risk_dqn_planner.policies.foresight.creeping import shortfalls
 from risk_dqn_planner.safety.assumptions import SafetyNumbers
+from risk_dqn_planner.safety.known import Known
 from risk_dqn_planner.situation.situations import (
     Booleans,
     Floats,
@@ -34,16 +35,15 @@ class SearchNumbers(NamedTuple):
 class Task(NamedTuple):
     """A row of B situations to be searched; all ways are the ego's from now on.
 
-    s, row, p: as in the joint check. c: of the search. reacted_m, corner_m (B, M): as in
-    `joint_check` and in sight.py. sound (B, 3): the actions to choose from. in_force (B,): the
-    action before.
+    s, row, p, known: as in the joint check. c: of the search. corner_m (B, M): as in sight.py.
+    sound (B, 3): the actions to choose from. in_force (B,): the action before.
     """
 
     s: Situations
     row: int
     p: SafetyNumbers
     c: SearchNumbers
-    reacted_m: Floats
+    known: Known
     corner_m: Floats
     sound: Booleans
     in_force: Integers
@@ -107,12 +107,12 @@ class Work(NamedTuple):
     """Room for one search; to be had from `work_for`.
 
     ahead: row k is the situation predicted for decision k, seen from the state in hand.
-    reacted_m (D, M). arrival_s, who (M,): of anyone; of_vehicles_s, nearest (M,): of perceived
-    vehicles.
+    known: for these rows. arrival_s, who (M,): of anyone; of_vehicles_s, nearest (M,): of
+    perceived vehicles.
     """
 
     ahead: Situations
-    reacted_m: Floats
+    known: Known
     arrival_s: Floats
     who: Integers
     of_vehicles_s: Floats
@@ -132,7 +132,9 @@ def work_for(c: SearchNumbers, p: SafetyNumbers, vehicles: int, lanes: int) -> W
     cells *= c.fine
     return Work(
         ahead=empty_situations(c.decisions, vehicles, lanes),
-        reacted_m=np.empty((c.decisions, lanes)),
+        known=Known(
+            np.empty((c.decisions, lanes)), *(np.empty((c.decisions, vehicles)) for _ in range(3))
+        ),
         arrival_s=np.empty(lanes),
         who=np.empty(lanes, dtype=np.int64),
         of_vehicles_s=np.empty(lanes),

@@ -59,7 +59,8 @@ class SoundnessCell:
 def assumptions_for(cell: Cell) -> SafetyAssumptions:
     """Return the default assumptions, with a bound on the errors that the sensor makes."""
     noise_mps = cell.load().sensor.velocity_noise_mps
-    return SafetyAssumptions(speed_error_mps=NOISE_DEVIATIONS * noise_mps)
+    # The simulation decides once in each period, exactly.
+    return SafetyAssumptions(speed_error_mps=NOISE_DEVIATIONS * noise_mps, period_error_s=0.0)
 
 
 def soundness_cells() -> list[SoundnessCell]:

@@ -17,6 +17,7 @@ from risk_dqn_planner.decision import Action
 from risk_dqn_planner.safety.assumptions import SafetyAssumptions
 from risk_dqn_planner.safety.course import BRAKE, GO, Course, begin_course, way_at, with_manoeuvre
 from risk_dqn_planner.safety.joint_check import NO_MANOEUVRE, joint_check, target_of
+from risk_dqn_planner.safety.known import at_first_sight
 from risk_dqn_planner.safety.others import earliest_arrivals
 from risk_dqn_planner.situation.situations import Floats, Situations, empty_situations
 from sim_bridge.evaluation.reporting.plotting import WIDTH_IN, save
@@ -60,7 +61,8 @@ def _course(ego_mps: float, action: Action, periods: int) -> Course:
 def _arrivals(s: Situations) -> Floats:
     lanes = s.lane_mask.shape[1]
     arrival_s, who = np.empty(lanes), np.empty(lanes, dtype=np.int64)
-    earliest_arrivals(s, 0, _ASSUMPTIONS.numbers(), arrival_s, who)
+    p = _ASSUMPTIONS.numbers()
+    earliest_arrivals(s, 0, at_first_sight(s, p), p, arrival_s, who)
     return arrival_s
 
 

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from risk_dqn_planner.compiled import kernel
 
 Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
 
 
 @kernel
@@ -36,30 +37,48 @@ def _sides(
 
 
 @kernel
-def crossing_edges_kernel(corners: Floats, tolerance_m: float) -> tuple[int, int]:
+def _cross(corners: Floats, i: int, j: int, tolerance_m: float) -> bool:
+    """Tell whether edges i and j have both ends of each on either side of the other."""
+    count = len(corners)
+    px, py = corners[i, 0], corners[i, 1]
+    qx, qy = corners[(i + 1) % count, 0], corners[(i + 1) % count, 1]
+    ax, ay = corners[j, 0], corners[j, 1]
+    bx, by = corners[(j + 1) % count, 0], corners[(j + 1) % count, 1]
+    if max(ay, by) < min(py, qy) or min(ay, by) > max(py, qy):
+        return False
+    a, b = _sides(px, py, qx, qy, ax, ay, bx, by)
+    if min(a, b) > -tolerance_m or max(a, b) < tolerance_m:
+        return False
+    p, q = _sides(ax, ay, bx, by, px, py, qx, qy)
+    return min(p, q) < -tolerance_m and max(p, q) > tolerance_m
+
+
+def crossing_edges(corners: Floats, tolerance_m: float) -> tuple[int, int]:
     """Return the first two edges of a polygon (K, 2) that cross, (-1, -1) if none do.
 
     Edge k begins at corner k. Edges cross if both ends of each lie more than the tolerance to
     either side of the other: outlines that touch themselves, or whose corners are rounded, do not.
     """
+    x = corners[:, 0]
+    next_x = np.roll(x, -1)
+    low_x, high_x = np.minimum(x, next_x), np.maximum(x, next_x)
+    return _sweep(corners, low_x, high_x, np.argsort(low_x), tolerance_m)
+
+
+@kernel
+def _sweep(
+    corners: Floats, low_x: Floats, high_x: Floats, order: Integers, tolerance_m: float
+) -> tuple[int, int]:
+    """Compare each edge with those that begin, from left to right, before it ends."""
     count = len(corners)
-    for i in range(count):
-        px, py = corners[i, 0], corners[i, 1]
-        qx, qy = corners[(i + 1) % count, 0], corners[(i + 1) % count, 1]
-        low_x, high_x, low_y, high_y = min(px, qx), max(px, qx), min(py, qy), max(py, qy)
-        for j in range(i + 2, count):
-            if i == 0 and j == count - 1:
-                continue  # neighbours
-            ax, ay = corners[j, 0], corners[j, 1]
-            bx, by = corners[(j + 1) % count, 0], corners[(j + 1) % count, 1]
-            if max(ax, bx) < low_x or min(ax, bx) > high_x:
-                continue
-            if max(ay, by) < low_y or min(ay, by) > high_y:
-                continue
-            a, b = _sides(px, py, qx, qy, ax, ay, bx, by)
-            if min(a, b) > -tolerance_m or max(a, b) < tolerance_m:
-                continue
-            p, q = _sides(ax, ay, bx, by, px, py, qx, qy)
-            if min(p, q) < -tolerance_m and max(p, q) > tolerance_m:
-                return i, j
-    return -1, -1
+    first = (count, count)
+    for place in range(count):
+        one = order[place]
+        for other in order[place + 1 :]:
+            if low_x[other] > high_x[one]:
+                break
+            i, j = min(one, other), max(one, other)
+            neighbours = j - i == 1 or j - i == count - 1
+            if not neighbours and (i, j) < first and _cross(corners, i, j, tolerance_m):
+                first = (i, j)
+    return first if first[0] < count else (-1, -1)

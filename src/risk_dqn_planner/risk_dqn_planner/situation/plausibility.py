@@ -12,7 +12,7 @@ import numpy as np
 
 from risk_dqn_planner.errors import InputError
 from risk_dqn_planner.faults import FaultyInput, Status
-from risk_dqn_planner.geometry.polygon import crossing_edges_kernel, enclosed_area_kernel
+from risk_dqn_planner.geometry.polygon import crossing_edges, enclosed_area_kernel
 from risk_dqn_planner.situation.inputs import (
     EgoPose,
     ObjectArrays,
@@ -213,7 +213,7 @@ class Plausibility:
             text = f"{len(corners)} corners, expected at most {limits.max_visible_corners}"
             raise InputError(f"visible area: {text}", kind, where)
         corners = np.ascontiguousarray(corners, dtype=np.float64)
-        i, j = crossing_edges_kernel(corners, _CROSSING_TOLERANCE_M)
+        i, j = crossing_edges(corners, _CROSSING_TOLERANCE_M)
         if i >= 0:
             text = f"edges {i} and {j} cross each other, expected a simple polygon"
             raise InputError(f"visible area: {text}", kind, where)

@@ -11,34 +11,20 @@ from risk_dqn_planner.decision import Action
 from risk_dqn_planner.errors import ConfigurationError
 from risk_dqn_planner.intersection.model import IntersectionModel
 from risk_dqn_planner.settled import Settled
-from risk_dqn_planner.situation.config import (
-    INSTANTANEOUS,
-    TRACKED,
-    TrackingConfig,
-    require_memory,
-)
+from risk_dqn_planner.situation.config import INSTANTANEOUS, TrackingConfig
 from risk_dqn_planner.situation.hidden_space import HiddenSpace
-from risk_dqn_planner.situation.situations import (
-    Booleans,
-    Floats,
-    Integers,
-    Situations,
-    empty_situations,
-)
+from risk_dqn_planner.situation.situations import Booleans, Floats, Integers, Situations
 from risk_dqn_planner.vehicle import EgoLimits
-from sim_bridge.perception.errors import err, perceive_with_errors
-from sim_bridge.perception.perception import empty_view, perceive
-from sim_bridge.perception.phantoms import empty_reported
-from sim_bridge.perception.poses import VehiclePoses, empty_poses, reveal, reveal_phantoms
+from sim_bridge.perception.perceiver import Perceiver
+from sim_bridge.perception.poses import VehiclePoses
 from sim_bridge.perception.tracking import Tracker
 from sim_bridge.perception.visible_area import visible_polygon
 from sim_bridge.scenarios.fields import Scenario
 from sim_bridge.simulation.lags import empty_lags, forget_lags
-from sim_bridge.simulation.settings import NEVER, reaction_of, sensing_of, settings_of
+from sim_bridge.simulation.settings import NEVER, reaction_of, settings_of
 from sim_bridge.simulation.starting import start_episodes
 from sim_bridge.simulation.state import NOBODY, empty_state
 from sim_bridge.simulation.stepping import advance, are_actions
-from sim_bridge.world.matches import most_lanes_at_once
 from sim_bridge.world.path_geometry import place_ahead, table_pose
 from sim_bridge.world.world import build_world
 
@@ -105,7 +91,6 @@ class Simulation:
         """
         if batch < 1:
             raise ConfigurationError(f"batch is {batch}, expected at least 1")
-        require_memory(memory)
         self.model = model
         self.scenario = scenario
         self.batch = batch
@@ -114,25 +99,17 @@ class Simulation:
         vehicles = int(scenario.traffic.vehicles.high)
         obstacles = 2 * scenario.obstacles.per_side
         self.state = empty_state(batch, vehicles, obstacles, len(model.lanes))
-        self._reaction, self._sensing = reaction_of(scenario), sensing_of(scenario)
+        self._reaction = reaction_of(scenario)
         delay_steps = round(scenario.ego.actuation_delay_s / scenario.timing.inner_step_s)
         self._lagging = delay_steps > 0 or self._reaction.after_steps != NEVER
         self.lags = empty_lags(batch, vehicles, delay_steps, self._reaction)
-        self._view = empty_view(batch, vehicles, obstacles)
-        self._phantoms = len(model.lanes) if self._sensing.phantom_share > 0.0 else 0
-        self._erring = any(self._sensing._replace(phantom_steps=0))
-        self._reported = empty_reported(batch, vehicles, self._phantoms)
-        self._pairs = max((vehicles + self._phantoms) * most_lanes_at_once(self.world.matches), 1)
-        self._instantaneous_lanes = self.world.lanes
         self._start, self._go_on = Settled(start_episodes), Settled(advance)
-        self._perceive = Settled(perceive)
-        self.tracker: Tracker | None = None
-        if memory == TRACKED:
-            # The memory says how far every lane is free, so nobody else need look along them.
-            nothing = np.zeros(1, dtype=np.int64)
-            self._instantaneous_lanes = self.world.lanes._replace(first_path=nothing)
-            config = tracking or TrackingConfig()
-            self.tracker = Tracker(self.world, config, scenario.sensor.range_m, batch, self._pairs)
+        self._perceiver = Perceiver(self.world, scenario, self.settings, batch, memory, tracking)
+
+    @property
+    def tracker(self) -> Tracker | None:
+        """The planner's memory, None without one."""
+        return self._perceiver.tracker
 
     @property
     def hidden_space(self) -> HiddenSpace | None:
@@ -211,7 +188,7 @@ class Simulation:
             self.state,
             (self._reaction, self.lags) if self._lagging else None,
             given,
-            self._view.shadows,
+            self._perceiver.shadows,
             steps,
         )
         return StepResult(
@@ -228,49 +205,7 @@ class Simulation:
 
         `out`, an earlier result of this simulation, is overwritten instead of taking new memory.
         """
-        result = out if out is not None else self._empty_situations()
-        episodes, vehicles, _ = self.state
-        world = self.world
-        self._perceive(
-            world.ego,
-            world.paths.table,
-            self._instantaneous_lanes,
-            world.matches,
-            world.sight,
-            world.obstacles.corners,
-            self.settings,
-            episodes,
-            vehicles,
-            self._view,
-            result,
-        )
-        if self._erring:
-            perceive_with_errors(
-                world.paths,
-                world.lanes,
-                world.matches,
-                self.settings,
-                self._sensing,
-                episodes,
-                vehicles,
-                self._view,
-                self._reported,
-                result,
-            )
-        if self.tracker is not None:
-            self.tracker.look(episodes.tick, self.settings.step_s, self._view, result)
-        return result
-
-    def _empty_situations(self) -> Situations:
-        result = empty_situations(self.batch, self._pairs, len(self.model.lanes))
-        lanes = self.world.lanes
-        result.lane_mask[:] = True
-        result.lane_id[:] = lanes.id
-        result.lane_merging[:] = lanes.merging
-        result.lane_speed_limit_mps[:] = lanes.limit_mps
-        result.lane_ego_zone_m[:] = lanes.ego_zone_m
-        result.lane_zone_m[:] = lanes.zone_m
-        return result
+        return self._perceiver.situations(self.state, out)
 
     def statistics(self) -> EpisodeStatistics:
         """Return the figures of the episodes so far."""
@@ -295,46 +230,11 @@ class Simulation:
 
     def vehicle_poses(self) -> VehiclePoses:
         """Return the truth about all vehicles, seen or hidden."""
-        episodes, vehicles, _ = self.state
-        poses = empty_poses(*vehicles.driving.shape)
-        poses.mask[:] = vehicles.driving
-        poses.id[:] = vehicles.id
-        poses.speed_mps[:] = vehicles.speed_mps
-        world, view = self.world, self._view
-        reveal(
-            world.ego,
-            world.paths.table,
-            world.obstacles.corners,
-            self.settings,
-            episodes,
-            vehicles,
-            view,
-            poses,
-        )
-        if self._erring:
-            err(self._sensing, episodes, vehicles, view)
-        poses.hidden[:] = vehicles.driving & ~view.seen
-        poses.measured_speed_mps[:] = view.measured_mps
-        return poses
+        return self._perceiver.vehicle_poses(self.state)
 
     def phantom_poses(self) -> VehiclePoses:
         """Return the phantoms (B, M), or (B, 0); the mask has those that the sensor reports now."""
-        world, reported = self.world, self._reported
-        poses = empty_poses(self.batch, self._phantoms)
-        if self._phantoms > 0:
-            reveal_phantoms(
-                world.ego,
-                world.paths,
-                world.lanes,
-                world.obstacles.corners,
-                self.settings,
-                self._sensing,
-                self.state.episodes,
-                self._view,
-                reported,
-                poses,
-            )
-        return poses
+        return self._perceiver.phantom_poses(self.state)
 
     def obstacles(self, episode: int = 0) -> list[Floats]:
         """Return the corners (4, 2) of one episode's obstacles, counter-clockwise."""

@@ -18,7 +18,8 @@ from sim_bridge.environment.seeds import VALIDATION_SEEDS, fixed_seeds
 from sim_bridge.learning.config import EvaluationConfig, TrainingConfig
 from sim_bridge.learning.export import initial_weights
 from sim_bridge.learning.presets import preset_named
-from sim_bridge.learning.session import Run, Session
+from sim_bridge.learning.run import Run
+from sim_bridge.learning.session import Session
 from sim_bridge.scenarios.loading import load_scenario
 
 MAP, SCENARIO, REWARD = "four_way", "base", "risk"

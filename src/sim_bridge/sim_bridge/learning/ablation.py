@@ -10,7 +10,7 @@ an option is no good, 130 interrupted.
 import argparse
 import json
 import sys
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,79 +18,23 @@ import numpy as np
 
 from risk_dqn_planner.errors import ConfigurationError, PlannerError
 from risk_dqn_planner.policies.loading import load_policy
-from risk_dqn_planner.policies.look_ahead import LookAheadConfig
 from risk_dqn_planner.policies.supervised import Supervisor
 from risk_dqn_planner.policies.supervised_loading import is_sound
 from sim_bridge.environment.episodes import DrivenEpisodes, drive
-from sim_bridge.environment.interface import Outcome
 from sim_bridge.environment.place import Places
 from sim_bridge.environment.seeds import TEST_SEEDS, fixed_seeds
-from sim_bridge.learning.checkpoint import POLICY, RunFolder
-from sim_bridge.learning.config import AdviceConfig
+from sim_bridge.learning.checkpoint import POLICY, SAVE_EVERY_S, RunFolder
 from sim_bridge.learning.export import initial_weights
 from sim_bridge.learning.presets import preset_named
-from sim_bridge.learning.session import Run, Session
+from sim_bridge.learning.run import Run
+from sim_bridge.learning.session import Score, Session
+from sim_bridge.learning.variants import MEANING, VARIANTS, Change
 from sim_bridge.scenarios.loading import load_scenario
 
-CHECKPOINT_EVERY_S = 30.0
 INTERRUPTED = 130
 SCENARIOS = "base,dense_traffic,severe_occlusion,close_small_obstacle"
 
-Change = Callable[[Run], Run]
 Figures = dict[str, float]
-
-
-def _config(**changes: object) -> Change:
-    return lambda run: replace(run, config=replace(run.config, **changes))  # type: ignore[arg-type]
-
-
-def _advice(**changes: object) -> Change:
-    def change(run: Run) -> Run:
-        advice = replace(run.config.advice or AdviceConfig(), **changes)  # type: ignore[arg-type]
-        return replace(run, config=replace(run.config, advice=advice))
-
-    return change
-
-
-def _rewards_alone(run: Run) -> Run:
-    """Nobody shows the way, so it has to be explored: as much as the preset `supervised` does."""
-    exploration = preset_named("supervised").exploration
-    return replace(run, config=replace(run.config, advice=None, exploration=exploration))
-
-
-def _state_alone(run: Run) -> Run:
-    """The paper's state and no expert, as the preset `supervised` has it."""
-    rewards = _rewards_alone(run)
-    return replace(rewards, config=replace(rewards.config, outlook=False))
-
-
-# Each differs from the first in one thing, but for those that leave out ever more of it.
-VARIANTS: Mapping[str, Change] = {
-    "reference": lambda run: run,
-    "advice_alone": _advice(alone=True, weight_end=1.0),
-    "advice_stays": _advice(weight_end=1.0),
-    "advice_not_calm": _advice(switching_price_s=LookAheadConfig.switching_price_s),
-    "rewards_alone": _rewards_alone,
-    "state_alone": _state_alone,
-    "with_memory": lambda run: replace(run, memory="tracked"),
-    "reward_arrival": lambda run: replace(run, reward="arrival"),
-    "reward_joint_risk": lambda run: replace(run, reward="joint_risk"),
-    "one_step": _config(n_step=1),
-    "one_update": _config(updates_per_step=1),
-}
-MEANING: Mapping[str, str] = {
-    "reference": "Q-learning with an outlook and an expert's advice",
-    "advice_alone": "no Q-learning: the expert is imitated",
-    "advice_stays": "the advice's weight does not fall to 0 over the run",
-    "advice_not_calm": "the expert pays no more for changes of action than when it drives itself",
-    "rewards_alone": "no advice; more exploration instead",
-    "state_alone": "no advice and no outlook: the paper's state",
-    "with_memory": "trained and driven with the memory of free space (`tracked`)",
-    "reward_arrival": "the reward has no prices for changes and hard brakes",
-    "reward_joint_risk": "the reward counts the risk of all vehicles as well",
-    "one_step": "one-step instead of five-step returns",
-    "one_update": "one update a step of all environments instead of four",
-}
 
 # Means over a policy's episodes in all cells, in the order of the table.
 COLUMNS = {
@@ -105,16 +49,15 @@ COLUMNS = {
 
 def figures_of(cells: Sequence[DrivenEpisodes]) -> Figures:
     """Return COLUMNS of all episodes together, shares in [0, 1]."""
-    outcome = np.concatenate([cell.outcome for cell in cells])
-    speed_mps = np.concatenate([cell.statistics.mean_speed_mps for cell in cells])
+    score = Score.of(cells)
     steps = sum(int(cell.statistics.action_counts.sum()) for cell in cells)
     changes = sum(int(cell.statistics.action_changes.sum()) for cell in cells)
     brakes = sum(int(cell.statistics.hard_brakes.sum()) for cell in cells)
     return {
-        "success": float(np.mean(outcome == Outcome.SUCCESS)),
-        "collision": float(np.mean(outcome == Outcome.COLLISION)),
-        "timeout": float(np.mean(outcome == Outcome.TIMEOUT)),
-        "mean_speed_mps": float(speed_mps.mean()),
+        "success": score.success,
+        "collision": score.collision,
+        "timeout": score.timeout,
+        "mean_speed_mps": score.mean_speed_mps,
         "switch_share": changes / steps,
         "hard_brake_share": brakes / steps,
     }
@@ -175,7 +118,7 @@ def _train(run: Run, places: Sequence[Places], folder: Path) -> None:
     session = Session(run, places, initial_weights(run.seed, run.outlook_size))
     files.resume(session)
     for _ in session.run():
-        files.save(session, every_s=CHECKPOINT_EVERY_S)
+        files.save(session, every_s=SAVE_EVERY_S)
     files.finish(session, folder.name)
 
 

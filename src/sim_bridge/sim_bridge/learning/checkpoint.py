@@ -14,12 +14,15 @@ from typing import Any
 from risk_dqn_planner.errors import ConfigurationError
 from risk_dqn_planner.policies.policy_file import PolicyContract, save_policy
 from sim_bridge.learning.export import network_of
-from sim_bridge.learning.session import Run, Session
+from sim_bridge.learning.run import Run
+from sim_bridge.learning.session import Session
 
 CHECKPOINT = "checkpoint.pickle"
 HISTORY = "history.json"
 POLICY = "policy.pt"
 RESULT = "result.json"
+# So much of a run is lost at most.
+SAVE_EVERY_S = 30.0
 
 
 class RunFolder:

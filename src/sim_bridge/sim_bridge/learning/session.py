@@ -8,20 +8,17 @@ Its whole state can be saved and taken over, so that an interrupted run ends in 
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from risk_dqn_planner.errors import ConfigurationError
 from risk_dqn_planner.policies.base import Policy
 from risk_dqn_planner.policies.look_ahead import LookAheadConfig
 from risk_dqn_planner.policies.outlook import Outlook, OutlookConfig
-from risk_dqn_planner.policies.supervised import Supervisor, SupervisorMode, supervisor_mode
+from risk_dqn_planner.policies.supervised import Supervisor
 from risk_dqn_planner.risk.config import RiskConfig
-from risk_dqn_planner.safety.assumptions import SafetyAssumptions
 from risk_dqn_planner.safety.guard import Guard
-from risk_dqn_planner.situation.config import INSTANTANEOUS, require_memory
 from risk_dqn_planner.state.encoding import StateConfig
 from risk_dqn_planner.state.history import StateEncoder
 from sim_bridge.environment.advisor import Advisor
@@ -32,84 +29,14 @@ from sim_bridge.environment.place import Place, Places
 from sim_bridge.environment.rewards import reward_named
 from sim_bridge.environment.seeds import VALIDATION_SEEDS, fixed_seeds
 from sim_bridge.environment.side_by_side import SideBySide, shares_of
-from sim_bridge.learning.config import AdviceConfig, TrainingConfig
+from sim_bridge.learning.config import AdviceConfig
 from sim_bridge.learning.dense import Array
 from sim_bridge.learning.greedy import GreedyPolicy
 from sim_bridge.learning.learner import Learner
+from sim_bridge.learning.run import Run
 from sim_bridge.learning.trainer import Progress, Trainer
 from sim_bridge.scenarios.loading import Scenario, load_scenario
 from sim_bridge.simulation.simulation import Simulation
-
-
-@dataclass(frozen=True)
-class Run:
-    """What is trained: all that decides the result, but for the maps' files.
-
-    map_name, scenario: one name, or several with commas between them. supervisor: `enforce` lets
-    only actions be taken, learned from and validated that are sound under `assumptions`; `off`
-    lets all be. memory: how the planner tells where hidden vehicles may be, see SituationConfig.
-    """
-
-    config: TrainingConfig
-    reward: str
-    seed: int
-    map_name: str
-    scenario: str
-    supervisor: str = SupervisorMode.OFF.value
-    memory: str = INSTANTANEOUS
-    assumptions: SafetyAssumptions = field(default_factory=SafetyAssumptions)
-
-    def __post_init__(self) -> None:
-        require_memory(self.memory)
-        if supervisor_mode(self.supervisor) is SupervisorMode.REPORT:
-            raise ConfigurationError(
-                "supervisor is 'report', which changes nothing in training, "
-                "expected one of: off, enforce"
-            )
-        if self.config.outlook and not self.supervised:
-            raise ConfigurationError(
-                f"supervisor is '{self.supervisor}', expected enforce for preset "
-                f"{self.config.preset}, whose network is told which actions are sound"
-            )
-
-    @property
-    def supervised(self) -> bool:
-        """Whether the supervisor enforces sound actions."""
-        return supervisor_mode(self.supervisor) is SupervisorMode.ENFORCE
-
-    @property
-    def outlook_size(self) -> int:
-        """How many numbers the network is told beyond the paper's state."""
-        return OutlookConfig().size if self.config.outlook else 0
-
-    def description(self) -> dict[str, Any]:
-        """Return all of it as JSON; what is not used is left out.
-
-        So a run without supervisor, memory and repeated exploration is described, and its
-        policy's file written, as before there was any of them.
-        """
-        found = asdict(self)
-        if not self.supervised:
-            del found["supervisor"], found["assumptions"]
-        if self.memory == INSTANTANEOUS:
-            del found["memory"]
-        if self.config.exploration.repeat == 0.0:
-            del found["config"]["exploration"]["repeat"]
-        if not self.config.outlook:
-            del found["config"]["outlook"]
-        if self.config.advice is None:
-            del found["config"]["advice"]
-        return found
-
-    @property
-    def map_names(self) -> list[str]:
-        """The maps' names, one by one."""
-        return self.map_name.split(",")
-
-    @property
-    def scenarios(self) -> list[str]:
-        """The scenarios' names, one by one."""
-        return self.scenario.split(",")
 
 
 @dataclass(frozen=True)

@@ -20,14 +20,14 @@ from risk_dqn_planner.map.loader import MapOrigin
 from risk_dqn_planner.map.route import parse_route
 from sim_bridge.environment.place import Places
 from sim_bridge.environment.rewards import REWARDS
-from sim_bridge.learning.checkpoint import RunFolder
+from sim_bridge.learning.checkpoint import SAVE_EVERY_S, RunFolder
 from sim_bridge.learning.config import TrainingConfig
 from sim_bridge.learning.export import initial_weights
 from sim_bridge.learning.presets import PRESETS, preset_named
-from sim_bridge.learning.session import Record, Run, Score, Session
+from sim_bridge.learning.run import Run
+from sim_bridge.learning.session import Record, Score, Session
 from sim_bridge.maps import map_names
 
-CHECKPOINT_EVERY_S = 30.0
 INTERRUPTED = 130
 
 
@@ -111,7 +111,7 @@ def _train(session: Session, folder: RunFolder, console: Console) -> None:
         task = progress.add_task("", total=steps, completed=round(session.progress * steps))
         for record in session.run():
             logs.write(record)
-            folder.save(session, every_s=CHECKPOINT_EVERY_S)
+            folder.save(session, every_s=SAVE_EVERY_S)
             progress.update(
                 task, completed=min(record.steps, steps), description=_line(record.evaluation)
             )

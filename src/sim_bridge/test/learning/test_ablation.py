@@ -9,10 +9,11 @@ import pytest
 from sim_bridge.environment.episodes import DrivenEpisodes
 from sim_bridge.environment.interface import Outcome
 from sim_bridge.learning import ablation
-from sim_bridge.learning.ablation import COLUMNS, MEANING, VARIANTS, figures_of, main, table_of
+from sim_bridge.learning.ablation import COLUMNS, figures_of, main, table_of
 from sim_bridge.learning.config import ExplorationConfig
 from sim_bridge.learning.presets import preset_named
-from sim_bridge.learning.session import Run
+from sim_bridge.learning.run import Run
+from sim_bridge.learning.variants import MEANING, VARIANTS
 from sim_bridge.simulation.simulation import EpisodeStatistics
 
 REFERENCE = Run(preset_named("advised"), "progress", 0, "four_way", "base", "enforce")

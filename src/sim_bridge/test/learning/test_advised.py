@@ -34,7 +34,8 @@ from sim_bridge.learning.config import (
 from sim_bridge.learning.export import initial_weights, network_of
 from sim_bridge.learning.learner import Learner
 from sim_bridge.learning.origin import origin_of
-from sim_bridge.learning.session import Run, Score, Session
+from sim_bridge.learning.run import Run
+from sim_bridge.learning.session import Score, Session
 from sim_bridge.scenarios.loading import load_scenario
 
 pytestmark = pytest.mark.filterwarnings("ignore:.*torch.jit:DeprecationWarning")

@@ -27,7 +27,8 @@ from sim_bridge.learning.config import EvaluationConfig, LearnerConfig, ReplayCo
 from sim_bridge.learning.export import initial_weights, network_of
 from sim_bridge.learning.learner import Learner
 from sim_bridge.learning.origin import origin_of
-from sim_bridge.learning.session import Run, Score, Session
+from sim_bridge.learning.run import Run
+from sim_bridge.learning.session import Score, Session
 from sim_bridge.learning.train import main
 from sim_bridge.scenarios.loading import load_scenario
 

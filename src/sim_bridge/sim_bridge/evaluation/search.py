@@ -10,7 +10,6 @@ always do what the other can.
 """
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
@@ -18,8 +17,9 @@ from risk_dqn_planner.compiled import kernel
 from risk_dqn_planner.decision import Action
 from risk_dqn_planner.geometry.footprint import footprints_overlap
 from risk_dqn_planner.risk.motion import time_to_cover
-from risk_dqn_planner.situation.situations import Floats, Integers
+from risk_dqn_planner.situation.situations import Integers
 from sim_bridge.evaluation.bounds import CELL_M, Bounds, Rules, Speeds
+from sim_bridge.evaluation.found import NOTHING, enlarged, find, rehashed, room_for, trace
 from sim_bridge.simulation.dynamics import follow_target, target_speed
 from sim_bridge.simulation.settings import EgoDrive
 from sim_bridge.simulation.state import Vehicles
@@ -30,96 +30,9 @@ IMPOSSIBLE = -1
 GAVE_UP = -2
 
 _ACTIONS = len(Action)
-_NOBODY = -1
 _FIRST_ROOM = 1 << 14
 # Times are compared in inner steps; rounding must not make the bound one step too long.
 _ROUNDING = 1e-6
-
-
-class Nodes(NamedTuple):
-    """States found so far, all (K,).
-
-    s_m, speed_mps: exact, as the simulation would have them; speed: index into `Speeds`.
-    tick: inner steps done; parent: index of the state before, -1 at the start; action: what led
-    here; next: next one in the same queue. A state at the goal has passed it at its tick.
-    """
-
-    s_m: Floats
-    speed_mps: Floats
-    speed: Integers
-    tick: Integers
-    parent: Integers
-    action: Integers
-    next: Integers
-
-
-@kernel
-def room_for(count: int) -> Nodes:
-    """Return room for so many states."""
-    return Nodes(
-        np.empty(count),
-        np.empty(count),
-        np.empty(count, dtype=np.int64),
-        np.empty(count, dtype=np.int64),
-        np.empty(count, dtype=np.int64),
-        np.empty(count, dtype=np.int64),
-        np.empty(count, dtype=np.int64),
-    )
-
-
-@kernel
-def enlarged(nodes: Nodes, used: int) -> Nodes:
-    """Return room for twice as many states with the old ones in it."""
-    larger = room_for(2 * len(nodes.s_m))
-    larger.s_m[:used] = nodes.s_m[:used]
-    larger.speed_mps[:used] = nodes.speed_mps[:used]
-    larger.speed[:used] = nodes.speed[:used]
-    larger.tick[:used] = nodes.tick[:used]
-    larger.parent[:used] = nodes.parent[:used]
-    larger.action[:used] = nodes.action[:used]
-    larger.next[:used] = nodes.next[:used]
-    return larger
-
-
-@kernel
-def place_of(s_m: float, speed: int, tick: int, merge_m: float, size: int) -> int:
-    """Return where the search for a state in a hash table of a power of two begins."""
-    mixed = (
-        np.uint64(round(s_m / merge_m)) * np.uint64(0x9E3779B97F4A7C15)
-        + np.uint64(speed) * np.uint64(0xBF58476D1CE4E5B9)
-        + np.uint64(tick) * np.uint64(0x94D049BB133111EB)
-    )
-    mixed ^= mixed >> np.uint64(29)
-    mixed *= np.uint64(0x9E3779B97F4A7C15)
-    return int(np.int64((mixed >> np.uint64(20)) & np.uint64(size - 1)))
-
-
-@kernel
-def find(table: Integers, nodes: Nodes, s_m: float, speed: int, tick: int, merge_m: float) -> int:
-    """Return where in the table a state is, or where it belongs if it is new."""
-    size = len(table)
-    place = place_of(s_m, speed, tick, merge_m, size)
-    position = round(s_m / merge_m)
-    while table[place] != _NOBODY:
-        k = table[place]
-        if (
-            nodes.tick[k] == tick
-            and nodes.speed[k] == speed
-            and round(nodes.s_m[k] / merge_m) == position
-        ):
-            return place
-        place = (place + 1) & (size - 1)
-    return place
-
-
-@kernel
-def rehashed(nodes: Nodes, used: int, size: int, merge_m: float) -> Integers:
-    """Return a hash table of the states."""
-    table = np.full(size, _NOBODY, dtype=np.int64)
-    for k in range(used):
-        place = find(table, nodes, nodes.s_m[k], nodes.speed[k], nodes.tick[k], merge_m)
-        table[place] = k
-    return table
 
 
 @kernel
@@ -216,17 +129,17 @@ def fastest_way(
     with equal speed at the same time are one. actions (T / decision_steps,): filled with the way.
     """
     nodes = room_for(_FIRST_ROOM)
-    table = np.full(4 * _FIRST_ROOM, _NOBODY, dtype=np.int64)
-    queue = np.full(latest + 1, _NOBODY, dtype=np.int64)
+    table = np.full(4 * _FIRST_ROOM, NOTHING, dtype=np.int64)
+    queue = np.full(latest + 1, NOTHING, dtype=np.int64)
     nodes.s_m[0], nodes.speed_mps[0], nodes.speed[0], nodes.tick[0] = start_m, speeds.mps[0], 0, 0
-    nodes.parent[0], nodes.action[0], nodes.next[0] = _NOBODY, 0, _NOBODY
+    nodes.parent[0], nodes.action[0], nodes.next[0] = NOTHING, 0, NOTHING
     table[find(table, nodes, start_m, 0, 0, merge_m)] = 0
     used = 1
     bound = earliest_tick(drive, rules, bounds, start_m, speeds.mps[0], 0, 0)
     queue[min(bound, latest)] = 0
     while bound <= latest:
         k = queue[bound]
-        if k == _NOBODY:
+        if k == NOTHING:
             bound += 1
             continue
         queue[bound] = nodes.next[k]
@@ -249,25 +162,10 @@ def fastest_way(
             speed = speeds.after[nodes.speed[k], action]
             then = max(earliest_tick(drive, rules, bounds, s_m, speed_mps, speed, tick), bound)
             place = find(table, nodes, s_m, speed, tick, merge_m)
-            if then <= latest and table[place] == _NOBODY:
+            if then <= latest and table[place] == NOTHING:
                 table[place] = used
                 nodes.s_m[used], nodes.speed_mps[used], nodes.speed[used] = s_m, speed_mps, speed
                 nodes.tick[used], nodes.parent[used], nodes.action[used] = tick, k, action
                 nodes.next[used], queue[then] = queue[then], used
                 used += 1
     return IMPOSSIBLE
-
-
-@kernel
-def trace(nodes: Nodes, end: int, actions: Integers) -> None:
-    """Fill in the actions (D,) that lead to a state; those behind it stay."""
-    count = 0
-    k = end
-    while nodes.parent[k] != _NOBODY:
-        count += 1
-        k = nodes.parent[k]
-    k = end
-    while nodes.parent[k] != _NOBODY:
-        count -= 1
-        actions[count] = nodes.action[k]
-        k = nodes.parent[k]

@@ -12,7 +12,7 @@ import bench  # noqa: F401 (finds the packages' own benchmarks)
 from bench.nodes.answering import restamped
 from bench.nodes.listening import spread, uneven
 from bench.nodes.page import write_page
-from bench.nodes.scene import MovingScene
+from bench.nodes.scene import MovingScene, perception
 from risk_dqn_planner.intersection.model import IntersectionModel
 from risk_dqn_planner.ros import conversions
 from risk_dqn_planner.situation.plausibility import Plausibility
@@ -46,7 +46,7 @@ def test_nothing_in_the_moving_scene_is_implausible(model: IntersectionModel) ->
     for k in range(200):
         stamp_ns = k * 100_000_000
         inputs = scene.inputs(0.1 * k, stamp_ns)
-        seen = conversions.perception_from_messages(*inputs, "map", 0.0)
+        seen = perception(inputs)
         checks.check(seen, 0.1 * k, 0.1 * k)
         places.append((seen.ego.x_m, seen.ego.y_m))
     assert np.hypot(*np.subtract(places[-1], places[0])) > 10.0

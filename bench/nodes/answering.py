@@ -18,7 +18,7 @@ from rclpy.serialization import serialize_message
 from rosgraph_msgs.msg import Clock
 
 from bench.nodes.listening import Ear, Spread, spread, undisturbed
-from bench.nodes.scene import MovingScene
+from bench.nodes.scene import MovingScene, perception
 from risk_dqn_planner.intersection.model import IntersectionModel
 from risk_dqn_planner.ros import conversions
 from risk_dqn_planner.ros.streams import SECOND_NS
@@ -50,9 +50,7 @@ def situations(model: IntersectionModel, objects: int, count: int) -> list[bytes
     made = []
     for k in range(count):
         stamp_ns = (k + 1) * DECISION_PERIOD_NS
-        seen = conversions.perception_from_messages(
-            *scene.inputs(k * period_s, stamp_ns), "map", 0.0
-        )
+        seen = perception(scene.inputs(k * period_s, stamp_ns))
         message = conversions.situation_to_message(pipeline.report(stamp_ns, seen))
         if message.status != Situation.OK:
             raise SystemExit(f"the benchmark's own input is refused: {message.status_text}")

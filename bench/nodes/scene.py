@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from risk_dqn_planner.geometry.polyline import Polyline
 from risk_dqn_planner.intersection.model import IntersectionModel
 from risk_dqn_planner.ros import conversions
-from risk_dqn_planner.situation.inputs import EgoPose, ObjectArrays, object_arrays
+from risk_dqn_planner.situation.inputs import EgoPose, ObjectArrays, Perception, object_arrays
 
 SIZE_M = (4.5, 1.8)
 TOP_SPEED_MPS = 14.0
@@ -35,6 +35,13 @@ class Inputs(NamedTuple):
     odometry: Odometry
     visible_area: PolygonStamped
     objects: PerceivedObjects
+
+
+def perception(inputs: Inputs) -> Perception:
+    """Return what the planner makes of the messages."""
+    area = conversions.read_area.of(inputs.visible_area)
+    objects = conversions.read_objects.of(inputs.objects)
+    return conversions.perception_from_messages(inputs.odometry, area, objects, "map", 0.0)
 
 
 class _Driver(NamedTuple):

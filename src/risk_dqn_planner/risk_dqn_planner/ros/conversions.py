@@ -29,6 +29,7 @@ from risk_dqn_planner.errors import InputError
 from risk_dqn_planner.faults import FaultyInput, Status
 from risk_dqn_planner.policies.base import Supervision
 from risk_dqn_planner.ros.explanations import explanation_from_message, explanation_to_message
+from risk_dqn_planner.ros.records import RecordList, RecordReader
 from risk_dqn_planner.ros.streams import SECOND_NS
 from risk_dqn_planner.situation.inputs import EgoPose, ObjectArrays, Perception
 from risk_dqn_planner.situation.report import SituationReport
@@ -37,6 +38,9 @@ from risk_dqn_planner.situation.situations import Floats, Situations, empty_situ
 _FIRST_NS, _LAST_NS = -(2**31) * SECOND_NS, 2**31 * SECOND_NS - 1
 # Orientations of drivers and simulators are normalised; an unset one has norm 0.
 _QUATERNION_NORM_TOLERANCE = 0.1
+
+read_area = RecordReader(Point32)
+read_objects = RecordReader(PerceivedObject)
 
 
 def to_ns(stamp: Time) -> int:
@@ -108,15 +112,11 @@ def ego_to_message(
     return message
 
 
-def objects_from_message(message: PerceivedObjects) -> ObjectArrays:
-    """Return the objects as arrays; the core checks them."""
-    objects = message.objects
-    table = np.array(
-        [(o.x_m, o.y_m, o.heading_rad, o.speed_mps, o.length_m, o.width_m) for o in objects],
-        dtype=np.float64,
-    ).reshape(-1, 6)
-    columns = np.ascontiguousarray(table.T)
-    return ObjectArrays(np.array([o.id for o in objects], dtype=np.int64), *columns)
+def objects_from_records(message: RecordList) -> ObjectArrays:
+    """Return a list of PerceivedObject as arrays; the core checks them."""
+    _, *numbers = ObjectArrays._fields
+    columns = (message.column(name) for name in numbers)
+    return ObjectArrays(message.column("id", np.int64), *columns)
 
 
 def objects_to_message(
@@ -142,9 +142,14 @@ def objects_to_message(
 
 
 def polygon_from_message(polygon: Polygon) -> Floats:
-    """Return the corners (K, 2); the core checks them."""
+    """Return the corners (K, 2)."""
     points = [(point.x, point.y) for point in polygon.points]
     return np.array(points, dtype=np.float64).reshape(-1, 2)
+
+
+def corners_from_records(message: RecordList) -> Floats:
+    """Return a list of Point32 as corners (K, 2); the core checks them."""
+    return np.column_stack((message.column("x"), message.column("y")))
 
 
 def polygon_to_message(corners: Floats) -> Polygon:
@@ -159,13 +164,13 @@ def area_to_message(corners: Floats, stamp_ns: int, frame_id: str = "map") -> Po
 
 def perception_from_messages(
     odometry: Odometry,
-    visible_area: PolygonStamped,
+    visible_area: RecordList,
     objects: Any,  # noqa: ANN401 (of whichever stack)
     frame_id: str,
     base_to_center_m: float,
-    objects_of: Callable[[Any], ObjectArrays] = objects_from_message,
+    objects_of: Callable[[Any], ObjectArrays] = objects_from_records,
 ) -> Perception:
-    """Return what three messages say together; `objects_of` reads the objects' message.
+    """Return what three messages say together; `objects_of` converts the objects' message.
 
     Raises:
         InputError: one of them is not in the frame, or an orientation is no rotation.
@@ -177,7 +182,7 @@ def perception_from_messages(
     return Perception(
         ego_from_message(odometry, base_to_center_m),
         objects_of(objects),
-        polygon_from_message(visible_area.polygon),
+        corners_from_records(visible_area),
         1e-9 * age_ns,
     )
 

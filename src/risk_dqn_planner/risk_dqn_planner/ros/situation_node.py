@@ -29,6 +29,7 @@ from risk_dqn_planner.ros.lifecycle import ManagedNode
 from risk_dqn_planner.ros.main import run_managed
 from risk_dqn_planner.ros.parameters import ClockParameters, EgoParameters, MapParameters
 from risk_dqn_planner.ros.qos import LATCHED, NEWEST
+from risk_dqn_planner.ros.records import RecordReader
 from risk_dqn_planner.ros.situation_output import SituationOutput
 from risk_dqn_planner.ros.streams import SECOND_NS, AgeLimits, InputRates
 from risk_dqn_planner.ros.synchroniser import Frame, Synchroniser, SynchroniserConfig
@@ -97,7 +98,7 @@ class SituationNode(ManagedNode):
         self._evaluation = Evaluation(maps, ego, objects, pipeline, Plausibility(), self._complain)
         self._output.frame_id = maps.map_frame
         self.reconfigure()
-        self._subscribe(objects_type)
+        self._subscribe(objects_type, objects.reader)
         self._refusal = None
 
     def refuse(self, error: PlannerError) -> None:
@@ -137,22 +138,25 @@ class SituationNode(ManagedNode):
             self.destroy_subscription(subscription)
         self._inputs, self._evaluation, self._refusal = [], None, None
 
-    def _subscribe(self, objects_type: type) -> None:
+    def _subscribe(self, objects_type: type, read_objects: RecordReader | None) -> None:
         # First, so that inputs which come at the same time are those of the new errand.
         route = self.create_subscription(Route, "~/input/route", self._on_route, LATCHED)
         self._inputs.append(route)
-        for kind, source, name in (
-            (Odometry, FaultyInput.ODOMETRY, "odometry"),
-            (PolygonStamped, FaultyInput.VISIBLE_AREA, "visible_area"),
-            (objects_type, FaultyInput.OBJECTS, "objects"),
+        for kind, source, name, read in (
+            (Odometry, FaultyInput.ODOMETRY, "odometry", None),
+            (PolygonStamped, FaultyInput.VISIBLE_AREA, "visible_area", conversions.read_area),
+            (objects_type, FaultyInput.OBJECTS, "objects", read_objects),
         ):
-            receive = self._receiver(source)
-            self._inputs.append(self.create_subscription(kind, f"~/input/{name}", receive, NEWEST))
+            receive, raw = self._receiver(source, read), read is not None
+            topic = f"~/input/{name}"
+            self._inputs.append(self.create_subscription(kind, topic, receive, NEWEST, raw=raw))
 
-    def _receiver(self, source: FaultyInput) -> Callable[[Any], None]:
+    def _receiver(self, source: FaultyInput, read: RecordReader | None) -> Callable[[Any], None]:
         def receive(message: Any) -> None:  # noqa: ANN401 (three kinds of messages)
             if not self._working:
                 return
+            if read is not None:
+                message = read(message)
             stamp_ns = conversions.to_ns(message.header.stamp)
             now, steady = now_ns(self), time.monotonic_ns()
             self._synchroniser.receive(source, stamp_ns, message, now, steady)

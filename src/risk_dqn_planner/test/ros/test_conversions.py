@@ -8,6 +8,7 @@ from enum import IntEnum
 import numpy as np
 import pytest
 from builtin_interfaces.msg import Time
+from geometry_msgs.msg import PolygonStamped
 from hypothesis import given
 from hypothesis import strategies as st
 from intersection_msgs.msg import Decision as DecisionMessage
@@ -22,7 +23,7 @@ from risk_dqn_planner.errors import InputError
 from risk_dqn_planner.explanation.fields import NOTHING_EXPLAINED, Critical, Explanation, Verdict
 from risk_dqn_planner.policies.base import Supervision
 from risk_dqn_planner.ros import conversions
-from risk_dqn_planner.situation.inputs import EgoPose, object_arrays
+from risk_dqn_planner.situation.inputs import EgoPose, Perception, object_arrays
 from risk_dqn_planner.situation.report import FaultyInput, SituationReport, Status
 from risk_dqn_planner.situation.warm_up import example_situation, square
 
@@ -116,22 +117,31 @@ def test_an_orientation_that_was_never_set_is_refused() -> None:
 def test_objects_survive_the_way_over_the_wire() -> None:
     objects = object_arrays([[1.0, 2.0, 0.5, 3.0], [4.0, 5.0, -0.5, 6.0]], [7, -9], (4.5, 1.8))
     message = conversions.objects_to_message(objects, STAMP_NS)
-    received = deserialize_message(serialize_message(message), PerceivedObjects)
-    assert received.header.frame_id == "map"
-    for before, after in zip(objects, conversions.objects_from_message(received), strict=True):
+    received = conversions.read_objects.of(message)
+    assert received.header == message.header
+    for before, after in zip(objects, conversions.objects_from_records(received), strict=True):
         assert after.dtype == before.dtype
         assert after.tolist() == before.tolist()
 
 
 def test_an_empty_list_of_objects_is_a_list() -> None:
-    objects = conversions.objects_from_message(PerceivedObjects())
+    objects = conversions.objects_from_records(conversions.read_objects.of(PerceivedObjects()))
     assert [len(column) for column in objects] == [0] * 7
 
 
 def test_a_polygon_keeps_its_corners_to_a_millimetre() -> None:
     area = conversions.area_to_message(square(123.4567), STAMP_NS)
-    corners = conversions.polygon_from_message(area.polygon)
-    assert corners == pytest.approx(square(123.4567), abs=1e-3)
+    for corners in (
+        conversions.polygon_from_message(area.polygon),
+        conversions.corners_from_records(conversions.read_area.of(area)),
+    ):
+        assert corners == pytest.approx(square(123.4567), abs=1e-3)
+
+
+def perception(odometry: Odometry, area: PolygonStamped, objects: PerceivedObjects) -> Perception:
+    """What messages say together once they have come over the wire."""
+    received = conversions.read_area.of(area), conversions.read_objects.of(objects)
+    return conversions.perception_from_messages(odometry, *received, "map", 0.0)
 
 
 def test_a_message_in_another_frame_is_refused() -> None:
@@ -139,7 +149,7 @@ def test_a_message_in_another_frame_is_refused() -> None:
     area = conversions.area_to_message(square(5.0), STAMP_NS)
     objects = conversions.objects_to_message(object_arrays(), STAMP_NS, frame_id="base_link")
     with pytest.raises(InputError, match="objects: frame is 'base_link', expected 'map'"):
-        conversions.perception_from_messages(odometry, area, objects, "map", 0.0)
+        perception(odometry, area, objects)
 
 
 def test_a_fault_of_a_message_names_its_kind_and_the_input() -> None:
@@ -158,7 +168,7 @@ def test_an_older_visible_area_is_known_to_be_older() -> None:
     objects = conversions.objects_to_message(object_arrays(), STAMP_NS)
     for older_ns in (0, 300_000_000, -100_000_000):
         area = conversions.area_to_message(square(5.0), STAMP_NS - older_ns)
-        seen = conversions.perception_from_messages(odometry, area, objects, "map", 0.0)
+        seen = perception(odometry, area, objects)
         assert seen.visible_area_age_s == pytest.approx(1e-9 * older_ns)
 
 

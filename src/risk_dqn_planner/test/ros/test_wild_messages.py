@@ -131,7 +131,9 @@ def test_whatever_is_perceived_gives_a_sound_situation_or_a_fault_that_is_the_in
     node = evaluation(memory, complaints)
     for k, messages in enumerate(seen):
         stamp_ns = 1000 * MS + 100 * MS * k
-        frame = Frame(stamp_ns, *(stamped(message, stamp_ns) for message in messages))
+        odometry, area, objects = (stamped(message, stamp_ns) for message in messages)
+        received = conversions.read_area.of(area), conversions.read_objects.of(objects)
+        frame = Frame(stamp_ns, odometry, *received)
         report, _ = node.report(frame)
         assert not complaints
         if report.status is Status.OK:

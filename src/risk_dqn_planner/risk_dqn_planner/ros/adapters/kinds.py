@@ -13,7 +13,8 @@ from risk_dqn_planner.errors import ConfigurationError
 from risk_dqn_planner.ros.adapters.autoware import objects_from_tracked
 from risk_dqn_planner.ros.adapters.config import AdapterConfig
 from risk_dqn_planner.ros.adapters.derived import objects_from_derived
-from risk_dqn_planner.ros.conversions import objects_from_message
+from risk_dqn_planner.ros.conversions import objects_from_records, read_objects
+from risk_dqn_planner.ros.records import RecordList, RecordReader
 from risk_dqn_planner.situation.inputs import ObjectArrays
 
 OWN_TYPE = "intersection_msgs/msg/PerceivedObjects"
@@ -21,8 +22,8 @@ OWN_TYPE = "intersection_msgs/msg/PerceivedObjects"
 Converter = Callable[[Any, AdapterConfig], ObjectArrays]
 
 
-def _own(message: Any, _: AdapterConfig) -> ObjectArrays:  # noqa: ANN401
-    return objects_from_message(message)
+def _own(message: RecordList, _: AdapterConfig) -> ObjectArrays:
+    return objects_from_records(message)
 
 
 CONVERTERS: dict[str, Converter] = {
@@ -55,6 +56,11 @@ class ObjectsAdapter:
             InputError: an object makes no sense.
         """
         return CONVERTERS[self.objects_type](message, self.objects)
+
+    @property
+    def reader(self) -> RecordReader | None:
+        """What reads the serialised messages; None where rclpy must, as for other stacks'."""
+        return read_objects if self.objects_type == OWN_TYPE else None
 
     def message_type(self) -> type:
         """Return the class of the messages, to subscribe with.

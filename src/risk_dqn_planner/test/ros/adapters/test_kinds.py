@@ -17,7 +17,8 @@ def test_own_objects_pass_as_they_are() -> None:
     message = PerceivedObjects(objects=[PerceivedObject(id=5, x_m=1.0, speed_mps=-2.0)])
     adapter = ObjectsAdapter(OWN_TYPE, AdapterConfig())
     assert adapter.message_type() is PerceivedObjects
-    objects = adapter(message)
+    assert adapter.reader is not None
+    objects = adapter(adapter.reader.of(message))
     assert (objects.id[0], objects.x_m[0], objects.speed_mps[0]) == (5, 1.0, -2.0)
 
 

@@ -41,11 +41,6 @@ _BEHIND_FIRST = HIDDEN * (HIDDEN + 1) + ACTIONS * (HIDDEN + 1)
 WEIGHTS = _FIRST_START + HIDDEN * (JOINED + 1) + _BEHIND_FIRST
 
 
-def weights_of(outlook: int) -> int:
-    """Return how many weights a network has that is told so many numbers beyond the state."""
-    return WEIGHTS + HIDDEN * outlook
-
-
 def outlook_of(weights: int) -> int:
     """Return how many numbers beyond the state a network with so many weights is told."""
     return (weights - WEIGHTS) // HIDDEN

@@ -63,8 +63,3 @@ def shipped_map(name: str) -> ShippedMap:
         origin=MapOrigin(*entry["origin"]),
         route=tuple(entry["route"]),
     )
-
-
-def map_path(name: str) -> Path:
-    """Return the file of one of the project's maps."""
-    return shipped_map(name).path

@@ -26,7 +26,6 @@ from sim_bridge.rendering.top_view import (
 )
 
 _HALF_WIDTH_M = 42.0
-_PANEL_RATIO = 1.0
 _WIDTH_IN, _HEIGHT_IN, _DPI = 13.0, 5.6, 110
 _MOMENTS = 4
 
@@ -63,7 +62,7 @@ def frame_image(model: IntersectionModel, frame: Frame, size_px: int = 480) -> N
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     draw_intersection(axes, model)
     draw_frame(axes, frame)
-    look_at(axes, zone_center(model), _HALF_WIDTH_M, _PANEL_RATIO)
+    look_at(axes, zone_center(model), _HALF_WIDTH_M)
     canvas.draw()
     return np.asarray(canvas.buffer_rgba())[..., :3].copy()
 
@@ -97,7 +96,7 @@ def _draw_moment(
         color = "#90a4ae" if each.action is None else ACTION_COLORS[each.action]
         axes.plot(each.ego.x_m, each.ego.y_m, ".", color=color, ms=3.0, zorder=4)
     draw_frame(axes, frame)
-    look_at(axes, _view_center(model, frame), _HALF_WIDTH_M, _PANEL_RATIO)
+    look_at(axes, _view_center(model, frame), _HALF_WIDTH_M)
     name = "-" if frame.action is None else frame.action.name
     axes.set_title(f"{frame.time_s:.1f} s  {name}  {frame.ego.speed_mps:.1f} m/s", fontsize=9)
     axes.set_xlabel("\n".join(_wrapped(frame.reason)), fontsize=6.5)

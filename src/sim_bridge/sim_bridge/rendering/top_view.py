@@ -39,7 +39,7 @@ def draw_intersection(axes: Axes, model: IntersectionModel) -> None:
     axes.plot(*_across(model.ego_path, model.goal_m).T, "-", color="#2e7d32", lw=2.0, zorder=3)
 
 
-def draw_frame(axes: Axes, frame: Frame, number: bool = True) -> None:
+def draw_frame(axes: Axes, frame: Frame) -> None:
     """Draw a moment: hidden vehicles hollow and dashed, the ego in its action's colour."""
     if frame.visible_area is not None:
         area = Patch(frame.visible_area, facecolor=_SEEN, edgecolor="#d4ac0d", lw=0.6)
@@ -49,16 +49,15 @@ def draw_frame(axes: Axes, frame: Frame, number: bool = True) -> None:
         axes.add_patch(Patch(corners, facecolor=_OBSTACLE, edgecolor="#34495e", zorder=4))
     for vehicle in frame.vehicles:
         _draw_vehicle(axes, vehicle, _OTHER)
-        if number:
-            _label(axes, vehicle)
+        _label(axes, vehicle)
     _draw_vehicle(axes, frame.ego, _EGO)
 
 
-def look_at(axes: Axes, center: tuple[float, float], half_width_m: float, ratio: float) -> None:
-    """Show a window about a point; `ratio` is its height over its width."""
+def look_at(axes: Axes, center: tuple[float, float], half_width_m: float) -> None:
+    """Show a square about a point."""
     x, y = center
     axes.set_xlim(x - half_width_m, x + half_width_m)
-    axes.set_ylim(y - half_width_m * ratio, y + half_width_m * ratio)
+    axes.set_ylim(y - half_width_m, y + half_width_m)
 
 
 def zone_center(model: IntersectionModel) -> tuple[float, float]:

@@ -16,19 +16,14 @@ import yaml
 from risk_dqn_planner.errors import ScenarioError
 from sim_bridge.scenarios.fields import Interval, Scenario
 
-__all__ = ["PACKAGE_FOLDER", "Scenario", "load_scenario", "load_scenarios", "scenario_names"]
+__all__ = ["PACKAGE_FOLDER", "Scenario", "load_scenario", "scenario_names"]
 
 PACKAGE_FOLDER = Path(__file__).resolve().parent
 
 
-def scenario_names(folder: Path = PACKAGE_FOLDER) -> list[str]:
-    """Return the names of the scenarios in a folder, sorted."""
-    return sorted(path.stem for path in folder.glob("*.yaml"))
-
-
-def load_scenarios(folder: Path = PACKAGE_FOLDER) -> dict[str, Scenario]:
-    """Load every scenario of a folder by name."""
-    return {name: load_scenario(folder / f"{name}.yaml") for name in scenario_names(folder)}
+def scenario_names() -> list[str]:
+    """Return the names of the scenarios of the package, sorted."""
+    return sorted(path.stem for path in PACKAGE_FOLDER.glob("*.yaml"))
 
 
 def load_scenario(name_or_path: str | Path) -> Scenario:

@@ -181,7 +181,7 @@ def test_a_network_with_an_outlook_is_that_of_the_torch_module_too() -> None:
     found = np.empty_like(weights)
     compiled_network.gradient(weights, signals, by, found)
     np.testing.assert_allclose(found, flat(list(expected)), rtol=1e-3, atol=1e-5)
-    assert len(weights) == compiled_network.weights_of(outlook)
+    assert len(weights) == compiled_network.WEIGHTS + compiled_network.HIDDEN * outlook
     assert compiled_network.outlook_of(len(weights)) == outlook
 
 

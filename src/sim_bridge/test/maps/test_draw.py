@@ -8,7 +8,7 @@ import pytest
 from risk_dqn_planner.errors import MapFileError
 from risk_dqn_planner.map.loader import RoadMap, load_map
 from risk_dqn_planner.map.route import resolve_route
-from sim_bridge.maps import map_names, map_path, shipped_map
+from sim_bridge.maps import map_names, shipped_map
 from sim_bridge.maps.draw import draw_maps
 
 NAMES = ("four_way", "t_junction", "multi_lane", "roundabout")
@@ -26,7 +26,7 @@ def elements(path: Path) -> list[tuple[str, dict[str, str]]]:
 
 def test_drawing_again_gives_the_committed_files(tmp_path: Path) -> None:
     for drawn in draw_maps(tmp_path):
-        fresh, committed = elements(drawn), elements(map_path(drawn.stem))
+        fresh, committed = elements(drawn), elements(shipped_map(drawn.stem).path)
         assert len(fresh) == len(committed)
         for (tag, values), (committed_tag, committed_values) in zip(fresh, committed, strict=True):
             for key in ("lat", "lon"):

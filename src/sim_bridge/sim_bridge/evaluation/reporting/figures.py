@@ -119,7 +119,7 @@ def _actions(lines: Sequence[Line], path: Path) -> Path | None:
             if policy != RULE_BASED:
                 bars.paper(policy, ACTION_USAGE.get(paper_role(policy) or "", {}))
         _describe(place, traffic, "relative number")
-    legend(figure, _labels(lines, drawn), paper=True, **{_INTERVAL: interval_mark()})
+    legend(figure, _labels(lines, drawn), **{_INTERVAL: interval_mark()})
     return save(figure, path)
 
 
@@ -143,7 +143,6 @@ def _challenges(lines: Sequence[Line], path: Path) -> Path | None:
     legend(
         figure,
         _labels(lines, drawn),
-        paper=True,
         **{
             "collisions; the rest are timeouts": collision_mark(),
             _LIMIT: limit_mark(),
@@ -174,7 +173,7 @@ def _speeds(lines: Sequence[Line], path: Path) -> Path | None:
         bars.limit(_by_range(lines, CLAIRVOYANT, traffic))
         _describe(place, traffic, "mean speed [m/s]")
     more = {_LIMIT: limit_mark(), _INTERVAL: interval_mark()}
-    legend(figure, _labels(lines, drawn), paper=True, **more)
+    legend(figure, _labels(lines, drawn), **more)
     return save(figure, path)
 
 

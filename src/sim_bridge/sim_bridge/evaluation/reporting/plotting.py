@@ -77,7 +77,7 @@ class Bars:
         left = self._groups.index(group) - 0.5 * _GROUP_WIDTH
         return left + (place + 0.5) * self._width
 
-    def add(self, policy: str, values: Values, form: str = "{:.2f}") -> None:
+    def add(self, policy: str, values: Values) -> None:
         """Draw a policy's bars with their intervals and numbers."""
         for group, value in values.items():
             if value is None:
@@ -88,7 +88,7 @@ class Bars:
             self._axes.errorbar(at, value.value, around, color="black", linewidth=1.0, capsize=2.5)
             top = max(value.high, value.value)
             self._axes.annotate(
-                form.format(value.value), (at, top), (0, 2), textcoords="offset points",
+                f"{value.value:.2f}", (at, top), (0, 2), textcoords="offset points",
                 ha="center", va="bottom", fontsize=8,
                 bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.8, "alpha": 0.8},
             )  # fmt: skip
@@ -124,18 +124,17 @@ class Bars:
                 self._axes.hlines(value.value, *ends, color=_LIMIT_COLOR, linestyle=(0, (4, 2)))
 
 
-def legend(figure: Figure, policies: Mapping[str, str], *, paper: bool, **more: Artist) -> None:
+def legend(figure: Figure, policies: Mapping[str, str], **more: Artist) -> None:
     """Explain the policies' colours by their labels, the paper's marks, intervals and `more`."""
     shades = colors(policies)
     entries: list[tuple[Artist, str]] = [
         (Patch(color=shades[policy]), label) for policy, label in policies.items()
     ]
-    if paper:
-        mark = Line2D(
-            [], [], linestyle="", marker="D", color="white", markeredgecolor="black",
-            markeredgewidth=1.4, markersize=7,
-        )  # fmt: skip
-        entries.append((mark, "the paper's value, in the policy's colour"))
+    mark = Line2D(
+        [], [], linestyle="", marker="D", color="white", markeredgecolor="black",
+        markeredgewidth=1.4, markersize=7,
+    )  # fmt: skip
+    entries.append((mark, "the paper's value, in the policy's colour"))
     entries += [(artist, label) for label, artist in more.items()]
     handles, labels = zip(*entries, strict=True)
     figure.legend(handles, labels, loc="outside lower center", ncols=3, fontsize=9.5, frameon=False)

@@ -4,18 +4,16 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from risk_dqn_planner.errors import ConfigurationError
 from risk_dqn_planner.intersection.builder import build_intersection
 from risk_dqn_planner.intersection.config import IntersectionConfig
 from risk_dqn_planner.intersection.model import IntersectionModel
 from risk_dqn_planner.map.loader import MapOrigin, RoadMap, load_map
 from risk_dqn_planner.situation.config import INSTANTANEOUS, TrackingConfig
-from sim_bridge.maps import shipped_map
+from sim_bridge.maps import chosen_map
 from sim_bridge.scenarios.loading import Scenario
 from sim_bridge.simulation.simulation import Simulation
 
@@ -99,14 +97,9 @@ def load_place(
     Raises:
         ConfigurationError: a file without route. MapError, RouteError: neither can be used.
     """
-    if map_name.endswith(".osm"):
-        path = Path(map_name)
-    else:
-        own = shipped_map(map_name)
-        path, route, origin = own.path, route or own.route, origin or own.origin
-    if route is None:
-        raise ConfigurationError(f"{map_name} is no own map, so its route must be given")
-    return place_on(map_name, load_map(path, origin, projector), route, reach_m)
+    chosen = chosen_map(map_name, route, origin)
+    road_map = load_map(chosen.path, chosen.origin, projector)
+    return place_on(map_name, road_map, chosen.route, reach_m)
 
 
 def place_on(

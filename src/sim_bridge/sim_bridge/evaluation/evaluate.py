@@ -18,8 +18,6 @@ from rich.console import Console
 from rich.table import Table
 
 from risk_dqn_planner.errors import ConfigurationError, PlannerError
-from risk_dqn_planner.map.loader import MapOrigin
-from risk_dqn_planner.map.route import parse_route
 from risk_dqn_planner.policies.shipped import shipped_policies
 from sim_bridge.environment.place import Places
 from sim_bridge.evaluation.campaign import Campaign, has_optimum, versions
@@ -37,7 +35,7 @@ from sim_bridge.evaluation.soundness.evaluate import (
 )
 from sim_bridge.evaluation.store import Store, write_whole
 from sim_bridge.evaluation.training_runs import RUN_FOLDERS, named_runs, training_runs
-from sim_bridge.maps import map_names
+from sim_bridge.maps import map_names, route_and_origin
 
 RESULTS = "results.json"
 INTERRUPTED = 130
@@ -93,8 +91,7 @@ def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
 
 
 def _places(arguments: argparse.Namespace) -> Places:
-    route = None if arguments.route is None else parse_route(arguments.route)
-    origin = MapOrigin.from_text(arguments.origin) if arguments.origin else None
+    route, origin = route_and_origin(arguments.route, arguments.origin)
     return Places.named(arguments.map or PAPER_MAP, route, origin)
 
 

@@ -16,8 +16,6 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from risk_dqn_planner.errors import PlannerError
-from risk_dqn_planner.map.loader import MapOrigin
-from risk_dqn_planner.map.route import parse_route
 from sim_bridge.environment.place import Places
 from sim_bridge.environment.rewards import REWARDS
 from sim_bridge.learning.checkpoint import SAVE_EVERY_S, RunFolder
@@ -26,7 +24,7 @@ from sim_bridge.learning.export import initial_weights
 from sim_bridge.learning.presets import PRESETS, preset_named
 from sim_bridge.learning.run import Run
 from sim_bridge.learning.session import Record, Score, Session
-from sim_bridge.maps import map_names
+from sim_bridge.maps import map_names, route_and_origin
 
 INTERRUPTED = 130
 
@@ -124,8 +122,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     name = arguments.name or f"{arguments.reward}_{arguments.preset}"
     out = arguments.out or Path("out/training") / f"{name}_seed{arguments.seed}"
     try:
-        origin = MapOrigin.from_text(arguments.origin) if arguments.origin else None
-        route = None if arguments.route is None else parse_route(arguments.route)
+        route, origin = route_and_origin(arguments.route, arguments.origin)
         run = Run(
             config=_config(arguments),
             reward=arguments.reward,

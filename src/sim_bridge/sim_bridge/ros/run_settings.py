@@ -8,11 +8,10 @@ from pathlib import Path
 
 from risk_dqn_planner.errors import BagError, ConfigurationError, PlannerError
 from risk_dqn_planner.map.loader import MapOrigin
-from risk_dqn_planner.map.route import parse_route
 from risk_dqn_planner.policies.shipped import DEFAULT_POLICY, DEFAULT_SUPERVISOR
 from risk_dqn_planner.policies.supervised import supervisor_mode
 from risk_dqn_planner.situation.config import SituationConfig, require_memory
-from sim_bridge.maps import map_names, shipped_map
+from sim_bridge.maps import chosen_map, map_names, route_and_origin
 from sim_bridge.ros.input_loss import InputLoss
 from sim_bridge.ros.process import NodeCommand, ParameterValue
 from sim_bridge.ros.topics import remappings
@@ -173,22 +172,14 @@ def run_settings(arguments: argparse.Namespace) -> RunSettings:
     # Whoever names a file wants it loaded, which runs its code; a bag's notes name none like that.
     named_file = {"allow_unlisted_policy": True} if arguments.policy.endswith(".pt") else {}
     name = str(arguments.map)
-    route = parse_route(arguments.route) if arguments.route else None
-    origin = MapOrigin.from_text(arguments.origin) if arguments.origin else None
-    if name.endswith(".osm"):
-        path = Path(name)
-        if route is None:
-            raise ConfigurationError(f"{name} is no own map, so its route must be given")
-        if origin is None:
-            raise ConfigurationError(f"{name} is no own map, so its origin must be given")
-    else:
-        own = shipped_map(name)
-        path, route, origin = own.path, route or own.route, origin or own.origin
+    chosen = chosen_map(name, *route_and_origin(arguments.route, arguments.origin))
+    if chosen.origin is None:
+        raise ConfigurationError(f"{name} is no own map, so its origin must be given")
     return RunSettings(
         map_name=name,
-        map_file=path,
-        route=route,
-        origin=origin,
+        map_file=chosen.path,
+        route=chosen.route,
+        origin=chosen.origin,
         projector=arguments.projector,
         policy=arguments.policy,
         scenario=arguments.scenario,

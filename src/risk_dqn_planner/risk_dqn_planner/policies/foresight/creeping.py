@@ -6,6 +6,7 @@ little further ahead that turns by a lot. But it cannot go back, and the shortes
 takes it a quarter of a metre. So what is left to the line is to be spent on hops that fit.
 """
 
+import functools
 import itertools
 
 import numpy as np
@@ -21,8 +22,12 @@ _GRAIN_M = 0.005
 _LONGEST_HOP = 5
 
 
+@functools.lru_cache(maxsize=16)
 def shortfalls(p: SafetyNumbers) -> Floats:
-    """Return how far short of a place an ego ends at best that rests k grains before it (K,)."""
+    """Return how far short of a place an ego ends at best that rests k grains before it (K,).
+
+    To be read only: whoever asks again gets the same array, since finding it takes milliseconds.
+    """
     count = int(FAR_M / _GRAIN_M) + 1
     reached = np.zeros(count, dtype=np.bool_)
     reached[0] = True

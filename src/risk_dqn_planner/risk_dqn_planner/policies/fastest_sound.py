@@ -79,9 +79,7 @@ def sound_decisions(
 
 def what_forbids(check: JointCheck, action: Integers) -> tuple[Integers, Integers, Floats]:
     """Return vehicle, lane and missing time (B,) that forbid actions (B,); -1, 0 if admissible."""
-    at = action[:, None]
-    free = np.take_along_axis(check.admissible, at, axis=1)[:, 0]
-    vehicle = np.take_along_axis(check.critical_vehicle, at, axis=1)[:, 0]
-    lane = np.take_along_axis(check.critical_lane, at, axis=1)[:, 0]
-    margin_s = np.take_along_axis(check.margin_s, at, axis=1)[:, 0]
-    return np.where(free, -1, vehicle), np.where(free, -1, lane), np.where(free, 0.0, -margin_s)
+    at = np.arange(len(action)), action
+    free, vehicle, lane = check.admissible[at], check.critical_vehicle[at], check.critical_lane[at]
+    lacking_s = -check.margin_s[at]
+    return np.where(free, -1, vehicle), np.where(free, -1, lane), np.where(free, 0.0, lacking_s)

@@ -89,7 +89,5 @@ def what_decided(ahead: ActionRewards, action: Integers) -> tuple[Integers, Inte
 
     For FAST there is none faster: what makes FAST itself risky, if anything does.
     """
-    faster = np.minimum(action + 1, Action.FAST)[:, None]
-    vehicle = np.take_along_axis(ahead.critical_vehicle, faster, axis=1)[:, 0]
-    lane = np.take_along_axis(ahead.critical_lane, faster, axis=1)[:, 0]
-    return vehicle, lane
+    at = np.arange(len(action)), np.minimum(action + 1, Action.FAST)
+    return ahead.critical_vehicle[at], ahead.critical_lane[at]

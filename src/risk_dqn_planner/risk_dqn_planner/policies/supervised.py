@@ -119,10 +119,9 @@ class Supervisor:
 
 def _allowed(sound: Booleans, proposed: Integers, q_values: Floats) -> Integers:
     """Return the proposed actions (B,) where they are sound (B, 3), else what stands in."""
+    rows = np.arange(len(proposed))
     order = _INSTEAD[proposed]
-    first = np.take_along_axis(sound, order, axis=1).argmax(axis=1)[:, None]
-    by_speed = np.take_along_axis(order, first, axis=1)[:, 0]
+    by_speed = order[rows, sound[rows[:, None], order].argmax(axis=1)]
     by_value = np.where(sound, q_values, -np.inf).argmax(axis=1)
     valued = np.isfinite(q_values).all(axis=1)
-    kept = np.take_along_axis(sound, proposed[:, None], axis=1)[:, 0]
-    return np.where(kept, proposed, np.where(valued, by_value, by_speed))
+    return np.where(sound[rows, proposed], proposed, np.where(valued, by_value, by_speed))

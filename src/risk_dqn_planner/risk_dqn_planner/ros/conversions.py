@@ -295,9 +295,11 @@ def _read_situation(message: SituationMessage) -> Situations:
     filled.vehicle_lane[0, :n] = [index[vehicle.lane_id] for vehicle in vehicles]
     filled.vehicle_distance_m[0, :n] = [vehicle.distance_m for vehicle in vehicles]
     filled.vehicle_speed_mps[0, :n] = [vehicle.speed_mps for vehicle in vehicles]
-    for name, values in zip(filled._fields, filled, strict=True):
-        if not np.isfinite(values).all():
-            raise _bad_situation(f"{name} is not finite", Status.NOT_FINITE)
+    # All fields at once: one after the other they take longer than everything else here.
+    if not np.isfinite(np.concatenate(filled, axis=None)).all():
+        named = zip(filled._fields, filled, strict=True)
+        name = next(name for name, values in named if not np.isfinite(values).all())
+        raise _bad_situation(f"{name} is not finite", Status.NOT_FINITE)
     return filled
 
 

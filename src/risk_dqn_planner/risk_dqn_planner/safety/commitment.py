@@ -42,7 +42,7 @@ class Commitments:
         An action that is not admissible leaves the manoeuvre before, less a period of it; one
         against it as well leaves braking.
         """
-        found = np.take_along_axis(check.periods, action[:, None], axis=1)[:, 0]
+        found = check.periods[np.arange(len(action)), action]
         kept = np.where(self._periods == GO, GO, np.maximum(self._periods - 1, BRAKE))
         kept = np.where(action == self.next_action(), kept, BRAKE)
         self._periods = np.where(found != NO_MANOEUVRE, found, kept)

@@ -35,6 +35,7 @@ from sim_bridge.evaluation.soundness.evaluate import (
 )
 from sim_bridge.evaluation.store import Store, write_whole
 from sim_bridge.evaluation.training_runs import RUN_FOLDERS, named_runs, training_runs
+from sim_bridge.folders import writing_to
 from sim_bridge.maps import map_names, route_and_origin
 
 RESULTS = "results.json"
@@ -125,7 +126,6 @@ def _called(driver: Contestant) -> str:
 
 
 def _write(folder: Path, head: dict[str, Any], results: list[dict[str, Any]]) -> None:
-    folder.mkdir(parents=True, exist_ok=True)
     write_whole(folder / RESULTS, json.dumps({"versions": head, "cells": results}, indent=1) + "\n")
 
 
@@ -179,9 +179,10 @@ def _paper(arguments: argparse.Namespace, console: Console) -> None:
         cell.load()  # a wrong name is told before hours of work
     results: list[dict[str, Any]] = []
     campaign = Campaign(places, episodes, Store(arguments.output / "cells"))
-    _run(campaign, drivers, cells, console, results)
-    _write(arguments.output, versions(places.usual, drivers), results)
-    _draw(arguments, console)
+    with writing_to(arguments.output):
+        _run(campaign, drivers, cells, console, results)
+        _write(arguments.output, versions(places.usual, drivers), results)
+        _draw(arguments, console)
     console.print(_overview(results))
 
 
@@ -197,14 +198,15 @@ def _soundness(arguments: argparse.Namespace, console: Console) -> None:
     episodes = EPISODES if arguments.episodes is None else arguments.episodes
     searched = arguments.search_episodes
     plan = Plan(arguments.output, episodes, searched, arguments.limit_episodes, **chosen)
-    head, lines = run(plan, console)
-    _write(arguments.output, head, lines)
     # Matplotlib takes a second to load, too long for --help.
     from sim_bridge.evaluation.soundness.reporting.page import write_soundness  # noqa: PLC0415
 
-    content = json.loads((arguments.output / RESULTS).read_text(encoding="utf-8"))
-    for path in write_soundness(content, arguments.output, arguments.report):
-        console.print(f"{path}")
+    with writing_to(arguments.output):
+        head, lines = run(plan, console)
+        _write(arguments.output, head, lines)
+        content = json.loads((arguments.output / RESULTS).read_text(encoding="utf-8"))
+        for path in write_soundness(content, arguments.output, arguments.report):
+            console.print(f"{path}")
 
 
 def _draw(arguments: argparse.Namespace, console: Console) -> None:

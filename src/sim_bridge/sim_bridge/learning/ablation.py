@@ -23,6 +23,7 @@ from risk_dqn_planner.policies.supervised_loading import is_sound
 from sim_bridge.environment.episodes import DrivenEpisodes, drive
 from sim_bridge.environment.place import Places
 from sim_bridge.environment.seeds import TEST_SEEDS, fixed_seeds
+from sim_bridge.folders import writing_to
 from sim_bridge.learning.checkpoint import POLICY, SAVE_EVERY_S, RunFolder
 from sim_bridge.learning.export import initial_weights
 from sim_bridge.learning.presets import preset_named
@@ -191,18 +192,19 @@ def _compare(arguments: argparse.Namespace) -> None:
     seeds, out = _seeds(arguments.seeds), arguments.out
     places = [Places.named(name) for name in reference.map_names]
     results: dict[str, list[Figures]] = {}
-    for name, change in changes.items():
-        for seed in seeds:
-            run, folder = replace(change(reference), seed=seed), out / f"{name}_seed{seed}"
-            _train(run, places, folder)
-            figures = _drive(run, places, folder / POLICY, arguments.episodes)
-            results.setdefault(name, []).append(figures)
-            print(f"{folder}: {figures}", flush=True)
-            (out / "results.json").write_text(json.dumps(results, indent=1) + "\n", "utf-8")
-            (out / "table.md").write_text(table_of(results, COLUMNS), encoding="utf-8")
-    if arguments.report is not None:
-        page = page_of(results, reference, arguments.episodes)
-        arguments.report.write_text(page, encoding="utf-8")
+    with writing_to(out):
+        for name, change in changes.items():
+            for seed in seeds:
+                run, folder = replace(change(reference), seed=seed), out / f"{name}_seed{seed}"
+                _train(run, places, folder)
+                figures = _drive(run, places, folder / POLICY, arguments.episodes)
+                results.setdefault(name, []).append(figures)
+                print(f"{folder}: {figures}", flush=True)
+                (out / "results.json").write_text(json.dumps(results, indent=1) + "\n", "utf-8")
+                (out / "table.md").write_text(table_of(results, COLUMNS), encoding="utf-8")
+        if arguments.report is not None:
+            page = page_of(results, reference, arguments.episodes)
+            arguments.report.write_text(page, encoding="utf-8")
     print(table_of(results, COLUMNS))
 
 

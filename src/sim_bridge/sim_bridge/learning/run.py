@@ -31,6 +31,8 @@ class Run:
     assumptions: SafetyAssumptions = field(default_factory=SafetyAssumptions)
 
     def __post_init__(self) -> None:
+        if self.seed < 0:
+            raise ConfigurationError(f"seed is {self.seed}, expected 0 or more")
         require_memory(self.memory)
         if supervisor_mode(self.supervisor) is SupervisorMode.REPORT:
             raise ConfigurationError(

@@ -18,6 +18,7 @@ from risk_dqn_planner.policies.shipped import (
     shipped_policies,
     write_sums,
 )
+from sim_bridge.folders import writing_to
 from sim_bridge.learning.checkpoint import POLICY, RESULT
 from sim_bridge.learning.model_card import Line, lines_of, write_card
 from sim_bridge.learning.origin import origin_of
@@ -75,11 +76,11 @@ def add_policy(run: Path, name: str, models: Path) -> ShippedPolicy:
     data = (run / POLICY).read_bytes()
     if len(data) >= MAX_BYTES:
         raise ConfigurationError(f"{run / POLICY} has {len(data)} bytes, expected < {MAX_BYTES}")
-    models.mkdir(parents=True, exist_ok=True)
     policy = ShippedPolicy(name, models / f"{name}.pt", origin.sha256)
-    policy.path.write_bytes(data)
-    listed = shipped_policies(models) if (models / SUMS).is_file() else {}
-    write_sums({**listed, name: policy}, models)
+    with writing_to(models):
+        policy.path.write_bytes(data)
+        listed = shipped_policies(models) if (models / SUMS).is_file() else {}
+        write_sums({**listed, name: policy}, models)
     return policy
 
 

@@ -18,6 +18,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, Ti
 from risk_dqn_planner.errors import PlannerError
 from sim_bridge.environment.place import Places
 from sim_bridge.environment.rewards import REWARDS
+from sim_bridge.folders import writing_to
 from sim_bridge.learning.checkpoint import SAVE_EVERY_S, RunFolder
 from sim_bridge.learning.config import TrainingConfig
 from sim_bridge.learning.export import initial_weights
@@ -140,8 +141,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         session = Session(run, places, initial_weights(run.seed, run.outlook_size))
         if folder.resume(session):
             console.print(f"resuming {out} at {session.progress:.0%}")
-        _train(session, folder, console)
-        policy = folder.finish(session, name)
+        with writing_to(out):
+            _train(session, folder, console)
+            policy = folder.finish(session, name)
     except PlannerError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2

@@ -15,8 +15,9 @@ from pathlib import Path
 
 from rich.console import Console
 
-from risk_dqn_planner.errors import ConfigurationError, PlannerError
+from risk_dqn_planner.errors import PlannerError
 from risk_dqn_planner.policies.loading import load_policy
+from sim_bridge.folders import writing_to
 from sim_bridge.ros.drive import drive
 from sim_bridge.ros.observer import EpisodeStuckError
 from sim_bridge.ros.pictures import EpisodePictures
@@ -64,14 +65,11 @@ def _clear(folder: Path) -> None:
     Raises:
         ConfigurationError: nothing can be written there.
     """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
+    with writing_to(folder):
         for old in (*folder.glob("episode_*.png"), folder / "summary.json"):
             old.unlink(missing_ok=True)
         if (folder / "bag").exists():
             shutil.rmtree(folder / "bag")
-    except OSError as error:
-        raise ConfigurationError(f"cannot write to {folder}: {error.strerror}") from error
 
 
 def run_demo(

@@ -160,6 +160,14 @@ def test_a_wrong_option_is_named_and_nothing_is_run(
     assert not (tmp_path / "results.json").exists()
 
 
+def test_a_folder_that_cannot_be_written_is_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "file").write_text("in the way")
+    assert evaluate.main([*OPTIONS, "--output", str(tmp_path / "file")]) == 2
+    assert f"error: cannot write to {tmp_path / 'file'}: File exists" in capsys.readouterr().err
+
+
 def test_only_what_was_trained_as_in_the_paper_stands_for_it() -> None:
     assert paper_role("risk_paper") == paper_role("risk_aware_paper") == "risk_aware"
     assert paper_role("collision_paper") == "collision_aware"

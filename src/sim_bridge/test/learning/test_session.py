@@ -193,6 +193,17 @@ def test_command_names_what_it_cannot_use(capsys: pytest.CaptureFixture[str]) ->
     assert "there is no reward 'comfort'" in capsys.readouterr().err
     assert main(["--preset", "fast"]) == 2
     assert "there is no preset 'fast'" in capsys.readouterr().err
+    assert main(["--seed", "-1"]) == 2
+    assert "seed is -1, expected 0 or more" in capsys.readouterr().err
+
+
+def test_a_folder_that_cannot_be_written_is_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "file").write_text("in the way")
+    out = tmp_path / "file" / "run"
+    assert main(["--steps", "20", "--out", str(out)]) == 2
+    assert f"error: cannot write to {out}: Not a directory" in capsys.readouterr().err
 
 
 def test_without_supervisor_and_memory_a_run_ends_as_it_did_before_there_were_any() -> None:

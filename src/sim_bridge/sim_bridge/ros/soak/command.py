@@ -18,8 +18,9 @@ from typing import Any
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-from risk_dqn_planner.errors import ConfigurationError, PlannerError
+from risk_dqn_planner.errors import PlannerError
 from risk_dqn_planner.policies.loading import load_policy
+from sim_bridge.folders import writing_to
 from sim_bridge.learning.checkpoint import git_revision
 from sim_bridge.ros.node_group import NodeGroup
 from sim_bridge.ros.process import NodeCommand, NodeDiedError
@@ -159,12 +160,9 @@ def _write(soak: Soak, about: dict[str, Any], title: str, folder: Path) -> list[
 
 
 def _make(folder: Path) -> None:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
+    with writing_to(folder):
         for old in ("soak.json", "memory.png"):
             (folder / old).unlink(missing_ok=True)
-    except OSError as error:
-        raise ConfigurationError(f"cannot write to {folder}: {error.strerror}") from error
 
 
 def main(argv: Sequence[str] | None = None) -> int:

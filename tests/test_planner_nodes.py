@@ -2,6 +2,7 @@
 """What the planner's real nodes decide on hand-made inputs."""
 
 import math
+import time
 from dataclasses import replace
 
 import pytest
@@ -145,3 +146,22 @@ def test_a_fault_is_a_diagnostic_error_and_its_end_is_too(planner: PlannerDriver
     for _ in range(3):
         planner.decide(FREE)
     planner.wait_for(lambda: planner.diagnostics[name].level == DiagnosticStatus.OK)
+
+
+def test_the_diagnostics_of_an_input_tell_of_its_fault_at_once(planner: PlannerDriver) -> None:
+    twin = Vehicle(id=5, path=first_path(planner), distance_m=30.0, speed_mps=1.0)
+    planner.decide(FREE)
+    waited_s = 0.0
+    for name, scene in (
+        ("situation: objects", replace(FREE, vehicles=(twin, twin))),
+        ("situation: visible area", replace(FREE, seen_m=0.0)),
+        ("situation: odometry", replace(FREE, aside_m=30.0)),
+    ):
+        planner.decide(scene)
+        began_s = time.monotonic()
+        planner.wait_for(
+            lambda name=name: planner.diagnostics[name].level == DiagnosticStatus.ERROR
+        )
+        waited_s += time.monotonic() - began_s
+    # Entries that came once a second would take longer, three times, but for one case in fifty.
+    assert waited_s < 0.5

@@ -6,6 +6,7 @@ from rclpy.node import Node
 from visualization_msgs.msg import MarkerArray
 
 from risk_dqn_planner.decision import Reason
+from risk_dqn_planner.faults import FaultyInput
 from risk_dqn_planner.policies.base import Supervision
 from risk_dqn_planner.ros import conversions, markers
 from risk_dqn_planner.ros.clock import now_ns, steady_timer
@@ -40,6 +41,8 @@ class DecisionOutput:
         )
         self._publisher.publish(message)
         self._tell(choice)
+        if choice.decision.faulty_input is FaultyInput.SITUATION:
+            self._tell_of_situations(stream)
         if self._marker_publisher.get_subscription_count() > 0:
             shown = markers.decision_markers(choice.decision, stamp_ns, self.marker_frame)
             self._marker_publisher.publish(shown)
@@ -70,14 +73,18 @@ class DecisionOutput:
 
     def _diagnose(self) -> None:
         if self._stream is not None:
-            now = now_ns(self._node)
-            level, text, values = stream_status(self._stream, now, _RATES)
-            age_s = self._stream.age_s(now)
-            if level == OK and age_s is not None and age_s > self.allowed_age_s:
-                level = WARN
-                text = (
-                    f"{age_s:.2f} s old, but the supervisor assumes that decisions take effect "
-                    f"within {self.allowed_age_s:g} s (safety.actuation_delay_s)"
-                )
-            self.diagnostics.set("situation", level, text, values)
+            self._tell_of_situations(self._stream)
         self.diagnostics.publish()
+
+    def _tell_of_situations(self, stream: Stream) -> None:
+        """Keep the diagnostics of the situations; a changed level goes out at once."""
+        now = now_ns(self._node)
+        level, text, values = stream_status(stream, now, _RATES)
+        age_s = stream.age_s(now)
+        if level == OK and age_s is not None and age_s > self.allowed_age_s:
+            level = WARN
+            text = (
+                f"{age_s:.2f} s old, but the supervisor assumes that decisions take effect "
+                f"within {self.allowed_age_s:g} s (safety.actuation_delay_s)"
+            )
+        self.diagnostics.set("situation", level, text, values)

@@ -177,6 +177,8 @@ class SituationNode(ManagedNode):
         for note in () if model is None else model.notes:
             self.get_logger().info(f"route {list(route)}: {note}")
         self._say_what_is_missing()
+        if self._working:
+            self._output.tell_of_route(evaluation.pipeline)
 
     def _advance(self) -> None:
         """Publish what is due, if anything is."""
@@ -200,6 +202,7 @@ class SituationNode(ManagedNode):
         stream = self._synchroniser.streams.get(report.source)
         if stream is not None:
             stream.note(Fault(report.stamp_ns, report.status, report.source, report.text))
+            self._output.tell_of_input(report.source, stream)
 
     def _watch(self) -> None:
         """Say what is missing, if nothing has been said for a while."""

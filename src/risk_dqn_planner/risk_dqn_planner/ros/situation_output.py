@@ -12,11 +12,11 @@ from risk_dqn_planner.ros.clock import now_ns
 from risk_dqn_planner.ros.conversions import situation_to_message
 from risk_dqn_planner.ros.diagnostics import ERROR, OK, STALE, WARN, Diagnostics, stream_status
 from risk_dqn_planner.ros.qos import EACH, NEWEST
-from risk_dqn_planner.ros.streams import InputRates
+from risk_dqn_planner.ros.streams import InputRates, Stream
 from risk_dqn_planner.ros.synchroniser import Synchroniser
 from risk_dqn_planner.situation.inputs import Perception
 from risk_dqn_planner.situation.pipeline import SituationPipeline
-from risk_dqn_planner.situation.report import Fault, SituationReport, Status
+from risk_dqn_planner.situation.report import Fault, FaultyInput, SituationReport, Status
 
 
 class SituationOutput:
@@ -72,12 +72,19 @@ class SituationOutput:
         text = state if refusal is None else f"{state}: {refusal.text}"
         self._diagnostics.set("node", level if refusal is None else ERROR, text)
         if state == "active" and pipeline is not None:
-            now = now_ns(self._node)
             for source, stream in synchroniser.streams.items():
-                level, text, values = stream_status(stream, now, self.rates.of(source))
-                self._diagnostics.set(str(source), level, text, values)
-            followed, fault = pipeline.model is not None, pipeline.route_fault
-            level = OK if followed else STALE if fault is None else ERROR
-            text = "followed" if followed else str(fault or "never received")
-            self._diagnostics.set("route", level, text, {"lanelets": pipeline.route})
+                self.tell_of_input(source, stream)
+            self.tell_of_route(pipeline)
         self._diagnostics.publish()
+
+    def tell_of_input(self, source: FaultyInput, stream: Stream) -> None:
+        """Keep the diagnostics of an input; a changed level goes out at once."""
+        level, text, values = stream_status(stream, now_ns(self._node), self.rates.of(source))
+        self._diagnostics.set(str(source), level, text, values)
+
+    def tell_of_route(self, pipeline: SituationPipeline) -> None:
+        """Keep the diagnostics of the route; a changed level goes out at once."""
+        followed, fault = pipeline.model is not None, pipeline.route_fault
+        level = OK if followed else STALE if fault is None else ERROR
+        text = "followed" if followed else str(fault or "never received")
+        self._diagnostics.set("route", level, text, {"lanelets": pipeline.route})

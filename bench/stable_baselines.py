@@ -15,7 +15,7 @@ from stable_baselines3.common.env_util import make_vec_env
 from bench.progress import say
 from bench.success import EPISODES, Reached
 from bench.timing import Stopwatch
-from risk_dqn_planner.policies.base import Decisions, Reason
+from risk_dqn_planner.policies.base import Decisions, Reason, bare_decisions
 from risk_dqn_planner.situation.situations import Booleans, Situations
 from risk_dqn_planner.state.history import StateEncoder
 from sim_bridge.environment.episodes import drive
@@ -100,15 +100,7 @@ class PeerPolicy:
         with torch.inference_mode():
             flat = torch.from_numpy(states.reshape(len(states), -1))
             q_values = self._network(flat).numpy().astype(np.float64)
-        nothing = np.full(len(states), -1, dtype=np.int64)
-        return Decisions(
-            action=q_values.argmax(axis=1),
-            q_values=q_values,
-            action_risks=np.full_like(q_values, np.nan),
-            reason=np.full(len(states), Reason.LEARNED, dtype=np.int64),
-            critical_vehicle=nothing,
-            critical_lane=nothing,
-        )
+        return bare_decisions(q_values.argmax(axis=1), Reason.LEARNED, q_values)
 
 
 def train(setup: Setup, place: Place, limit_s: float) -> Reached:

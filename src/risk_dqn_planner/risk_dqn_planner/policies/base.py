@@ -98,6 +98,23 @@ class Decisions(NamedTuple):
     in_force: Integers | None = None
 
 
+def bare_decisions(action: Integers, reason: Reason, q_values: Floats | None = None) -> Decisions:
+    """Return decisions for actions (B,) that name nobody and know no risks.
+
+    q_values (B, 3): None where there are none either.
+    """
+    unknown = np.full((len(action), len(Action)), np.nan)
+    nobody = np.full(len(action), -1)
+    return Decisions(
+        action=action,
+        q_values=unknown.copy() if q_values is None else q_values,
+        action_risks=unknown,
+        reason=np.full(len(action), reason, dtype=np.int64),
+        critical_vehicle=nobody,
+        critical_lane=nobody.copy(),
+    )
+
+
 class Policy(Protocol):
     """A policy may remember earlier situations; `restart` tells where that memory is void."""
 

@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from risk_dqn_planner.policies.base import Action, Decisions, Reason
+from risk_dqn_planner.policies.base import Action, Decisions, Reason, bare_decisions
 from risk_dqn_planner.policies.fingerprint import fingerprint
 from risk_dqn_planner.situation.situations import Booleans, Situations
 
@@ -19,12 +19,4 @@ class ConstantPolicy:
     def decide(self, situations: Situations, restart: Booleans) -> Decisions:  # noqa: ARG002
         """Decide the same for each situation; risks are not looked at."""
         batch = situations.ego_speed_mps.shape[0]
-        unknown = np.full((batch, len(Action)), np.nan)
-        return Decisions(
-            action=np.full(batch, self.action, dtype=np.int64),
-            q_values=unknown,
-            action_risks=unknown.copy(),
-            reason=np.full(batch, Reason.FIXED, dtype=np.int64),
-            critical_vehicle=np.full(batch, -1),
-            critical_lane=np.full(batch, -1),
-        )
+        return bare_decisions(np.full(batch, self.action, dtype=np.int64), Reason.FIXED)

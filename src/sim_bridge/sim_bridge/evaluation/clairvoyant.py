@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from risk_dqn_planner.errors import ScenarioError
-from risk_dqn_planner.policies.base import Action, Decisions, Reason
+from risk_dqn_planner.policies.base import Action, Decisions, Reason, bare_decisions
 from risk_dqn_planner.policies.fingerprint import fingerprint
 from risk_dqn_planner.situation.situations import Booleans, Integers, Situations
 from sim_bridge.environment.seeds import Seeds
@@ -227,12 +227,4 @@ class ClairvoyantPolicy:
         if self._done < known:
             action[:] = self._actions[:, self._done]
         self._done += 1
-        unknown = np.full((batch, len(Action)), np.nan)
-        return Decisions(
-            action=action,
-            q_values=unknown,
-            action_risks=unknown.copy(),
-            reason=np.full(batch, Reason.FIXED, dtype=np.int64),
-            critical_vehicle=np.full(batch, -1),
-            critical_lane=np.full(batch, -1),
-        )
+        return bare_decisions(action, Reason.FIXED)

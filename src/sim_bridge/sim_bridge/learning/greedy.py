@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from risk_dqn_planner.policies.base import Action, Decisions, Reason
+from risk_dqn_planner.policies.base import Action, Decisions, Reason, bare_decisions
 from risk_dqn_planner.policies.outlook import Outlook
 from risk_dqn_planner.situation.situations import Booleans, Situations
 from risk_dqn_planner.state.history import StateEncoder
@@ -37,12 +37,4 @@ class GreedyPolicy:
         action = np.where(sound, q_values, -np.inf).argmax(axis=1)
         if self._outlook is not None and views is not None:
             self._outlook.decided(views, action)
-        nothing = np.full(batch, -1, dtype=np.int64)
-        return Decisions(
-            action=action,
-            q_values=q_values,
-            action_risks=np.full_like(q_values, np.nan),
-            reason=np.full(batch, Reason.LEARNED, dtype=np.int64),
-            critical_vehicle=nothing,
-            critical_lane=nothing,
-        )
+        return bare_decisions(action, Reason.LEARNED, q_values)

@@ -6,8 +6,8 @@ import os
 import signal
 import socket
 import subprocess
-from collections.abc import Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -34,12 +34,24 @@ def _is_free(domain_id: int) -> bool:
     return True
 
 
-def free_domain_id() -> int:
-    """Find a ROS domain that nobody on this computer uses; processes start looking apart."""
+@contextmanager
+def own_domain() -> Iterator[int]:
+    """Hold a ROS domain that nobody on this computer uses; processes start looking apart.
+
+    Raises:
+        ConfigurationError: every domain is in use.
+    """
     for offset in range(_DOMAINS):
         domain_id = 1 + (os.getpid() + offset) % _DOMAINS
-        if _is_free(domain_id):
-            return domain_id
+        # Two that look at the same time both find it free, but only one can take the name.
+        with socket.socket(socket.AF_UNIX) as claim:
+            try:
+                claim.bind(f"\0risk_dqn_planner/ros_domain/{domain_id}")
+            except OSError:
+                continue
+            if _is_free(domain_id):
+                yield domain_id
+                return
     raise ConfigurationError(f"none of the ROS domains 1 to {_DOMAINS} is free on this computer")
 
 

@@ -15,7 +15,7 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
 from risk_dqn_planner.errors import PlannerError
-from sim_bridge.ros.process import free_domain_id, isolate
+from sim_bridge.ros.process import isolate, own_domain
 
 _LOOK_AGAIN_S = 0.02
 
@@ -35,8 +35,15 @@ def ros_session(name: str) -> Iterator[Node]:
     Processes started within inherit the domain. A request to terminate becomes a
     KeyboardInterrupt, so that `with` blocks end the processes they have started.
     """
-    isolate(free_domain_id())
     signal.signal(signal.SIGTERM, _interrupt)
+    with own_domain() as domain_id:
+        isolate(domain_id)
+        with _listening(name) as node:
+            yield node
+
+
+@contextmanager
+def _listening(name: str) -> Iterator[Node]:
     context = Context()
     rclpy.init(context=context, signal_handler_options=SignalHandlerOptions.NO)
     node = Node(name, context=context)

@@ -7,7 +7,7 @@ import pytest
 
 from risk_dqn_planner.errors import ConfigurationError
 from sim_bridge.ros.node_group import uninterrupted
-from sim_bridge.ros.process import NodeCommand, free_domain_id
+from sim_bridge.ros.process import NodeCommand, own_domain
 
 
 def test_a_package_that_is_not_installed_is_named() -> None:
@@ -21,11 +21,20 @@ def test_an_executable_that_does_not_exist_is_named() -> None:
 
 
 def test_a_domain_that_is_in_use_is_not_taken() -> None:
-    first = free_domain_id()
+    with own_domain() as first:
+        pass
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
         taken.bind(("", 7400 + 250 * first + 10))
-        assert free_domain_id() != first
+        with own_domain() as other:
+            assert other != first
     assert 1 <= first <= 100
+
+
+def test_two_that_look_at_the_same_time_take_different_domains() -> None:
+    with own_domain() as one, own_domain() as other:  # nobody listens in either yet
+        assert one != other
+    with own_domain() as again:
+        assert again == one
 
 
 @pytest.mark.parametrize("request_to_end", [signal.SIGINT, signal.SIGTERM], ids=lambda s: s.name)

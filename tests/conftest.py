@@ -2,7 +2,7 @@
 """Real node processes for tests, each group in a ROS domain of its own."""
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,11 +11,13 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent))
 
 from planner_driver import PlannerDriver
+from rclpy.node import Node
 
 from risk_dqn_planner.intersection.model import IntersectionModel
 from risk_dqn_planner.map.loader import load_map
 from sim_bridge.ros.building import SimulationShelf
 from sim_bridge.ros.node_group import NodeGroup
+from sim_bridge.ros.process import NodeCommand, NodeProcess
 from sim_bridge.ros.run_settings import RunSettings, own_map_settings
 from sim_bridge.ros.session import ros_session
 from sim_bridge.simulation.simulation import Simulation
@@ -37,6 +39,31 @@ def simulation(settings: RunSettings) -> Simulation:
 @pytest.fixture(scope="session")
 def model(simulation: Simulation) -> IntersectionModel:
     return simulation.model
+
+
+@pytest.fixture
+def node() -> Iterator[Node]:
+    """A node that listens in a ROS domain of its own."""
+    with ros_session("test") as session_node:
+        yield session_node
+
+
+@pytest.fixture
+def start(node: Node, tmp_path: Path) -> Iterator[Callable[[NodeCommand], NodeProcess]]:
+    """Starts processes in the domain of `node`, which end with the test."""
+    assert node.context.ok()  # before it, there is no domain to inherit
+    started: list[NodeProcess] = []
+
+    def start_one(command: NodeCommand) -> NodeProcess:
+        log = tmp_path / f"{len(started)}_{command.executable}.log"
+        started.append(NodeProcess(command, log))
+        return started[-1]
+
+    yield start_one
+    for process in started:
+        process.interrupt()
+    for process in started:
+        process.stop()
 
 
 @pytest.fixture(scope="module")

@@ -3,61 +3,33 @@
 
 import os
 import signal
-from collections.abc import Sequence
 from pathlib import Path
-from types import TracebackType
 
-from sim_bridge.ros.node_group import uninterrupted
-from sim_bridge.ros.process import NodeCommand, NodeProcess
+from sim_bridge.ros.node_group import NodeGroup, uninterrupted
+from sim_bridge.ros.process import NodeProcess
 
 
-class NodePair:
+class NodePair(NodeGroup):
     """The planner's two nodes; a context manager."""
 
-    def __init__(self, commands: Sequence[NodeCommand], logs: Path) -> None:
-        self._commands = {command.executable: command for command in commands}
-        self._logs = logs
-        self._started = 0
-        self.running: dict[str, NodeProcess] = {}
-
-    def __enter__(self) -> "NodePair":
-        for name in self._commands:
-            self.start(name)
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.end()
-
     def start(self, name: str) -> None:
-        """Start a node, in place of one of its name that was killed."""
-        self._started += 1
+        """Start a node again that was killed; what the killed one printed is kept beside it."""
+        command = next(command for command in self._commands if command.executable == name)
         with uninterrupted():
-            log = self._logs / f"{self._started}_{name}.log"
-            self.running[name] = NodeProcess(self._commands[name], log)
+            self._processes.append(NodeProcess(command, self._free_log(name)))
 
     def kill(self, name: str) -> None:
         """End a node at once, as the system does when memory runs out."""
-        process = self.running.pop(name)
+        process = next(process for process in self._processes if process.name == name)
         os.killpg(process.pid, signal.SIGKILL)
         process.stop()
-
-    def check(self) -> None:
-        """Raise NodeDiedError if a node has ended by itself."""
-        for process in self.running.values():
-            process.check()
+        self._processes.remove(process)
 
     def end(self) -> dict[str, tuple[int, str]]:
         """Ask the nodes to end; return the exit code and output of each."""
-        with uninterrupted():
-            for process in self.running.values():
-                process.interrupt()
-            ended = {
-                name: (process.stop(), process.output()) for name, process in self.running.items()
-            }
-        self.running = {}
-        return ended
+        self.stop()
+        return {process.name: (process.stop(), process.output()) for process in self._processes}
+
+    def _free_log(self, name: str) -> Path:
+        number = len(list(self._log_folder.glob(f"*{name}.log")))
+        return self._log_folder / f"{number}_{name}.log"

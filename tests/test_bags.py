@@ -3,7 +3,6 @@
 
 import os
 import shutil
-import subprocess
 from collections import Counter
 from concurrent.futures import Future, ThreadPoolExecutor
 from itertools import pairwise
@@ -11,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ament_index_python.packages import get_package_prefix
+from commands import Done, run
 from intersection_msgs.msg import Decision, PerceivedObjects
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
@@ -30,20 +29,6 @@ from sim_bridge.ros.recording import BagWriter, Stored, installed_types, read_ba
 
 BAGS = Path(__file__).resolve().parents[1] / "bags"
 RECORDED = (*topics.INPUTS, topics.DECISION)
-PATIENCE_S = 600.0
-
-Done = subprocess.CompletedProcess[str]
-
-
-def run(command: str, *options: str) -> Done:
-    executable = Path(get_package_prefix("sim_bridge")) / "lib" / "sim_bridge" / command
-    return subprocess.run(
-        [str(executable), *options],
-        capture_output=True,
-        text=True,
-        timeout=PATIENCE_S,
-        check=False,
-    )
 
 
 def run_replay(*options: str) -> Done:

@@ -2,14 +2,13 @@
 """The demo as users run it: real processes, a bag, a summary, pictures, and nothing left behind."""
 
 import json
-import subprocess
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pytest
-from ament_index_python.packages import get_package_prefix
+from commands import run as run_command
 from intersection_msgs.msg import Decision, EpisodeEvent, GroundTruth, PerceivedObjects
 from rclpy.serialization import deserialize_message
 
@@ -26,18 +25,6 @@ pytestmark = pytest.mark.ros
 
 EPISODES = 2
 SEED = 4
-PATIENCE_S = 300.0
-
-
-def demo_command(*options: str) -> list[str]:
-    executable = Path(get_package_prefix("sim_bridge")) / "lib" / "sim_bridge" / "demo"
-    return [str(executable), *options]
-
-
-def run_demo(*options: str) -> "subprocess.CompletedProcess[str]":
-    return subprocess.run(
-        demo_command(*options), capture_output=True, text=True, timeout=PATIENCE_S, check=False
-    )
 
 
 @dataclass(frozen=True)
@@ -52,7 +39,9 @@ class Run:
 
 
 def run_into(folder: Path, episodes: int) -> Run:
-    done = run_demo("--episodes", str(episodes), "--seed", str(SEED), "--out", str(folder))
+    done = run_command(
+        "demo", "--episodes", str(episodes), "--seed", str(SEED), "--out", str(folder)
+    )
     assert done.returncode == 0, done.stdout + done.stderr
     return Run(folder, done.stdout)
 

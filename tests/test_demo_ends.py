@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from ament_index_python.packages import get_package_prefix
+from commands import executable, run
 
 from sim_bridge.ros.session import wait_until
 
@@ -16,7 +16,6 @@ pytestmark = pytest.mark.ros
 
 PATIENCE_S = 300.0
 MARK = "DEMO_STARTED_BY_TEST"
-DEMO = Path(get_package_prefix("sim_bridge")) / "lib" / "sim_bridge" / "demo"
 
 
 class RunningDemo:
@@ -25,7 +24,7 @@ class RunningDemo:
     def __init__(self, folder: Path) -> None:
         self._folder = folder
         self.process = subprocess.Popen(
-            [str(DEMO), "--rate", "1.0", "--out", str(folder)],
+            [executable("demo"), "--rate", "1.0", "--out", str(folder)],
             env=os.environ | {MARK: str(folder)},
             stdout=subprocess.DEVNULL,
             stderr=subprocess.PIPE,
@@ -98,13 +97,7 @@ def test_a_node_that_dies_ends_the_demo_which_names_it(demo: RunningDemo) -> Non
 
 
 def test_a_map_that_cannot_be_used_ends_the_demo_with_one_sentence() -> None:
-    done = subprocess.run(
-        [str(DEMO), "--map", "nowhere.osm", "--route", "1,2", "--origin", "49.0,8.4"],
-        capture_output=True,
-        text=True,
-        timeout=PATIENCE_S,
-        check=False,
-    )
+    done = run("demo", "--map", "nowhere.osm", "--route", "1,2", "--origin", "49.0,8.4")
     assert done.returncode == 2
     assert done.stderr.startswith("demo: nowhere.osm does not exist")
     assert len(done.stderr.strip().splitlines()) == 1, done.stderr

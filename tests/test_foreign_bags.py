@@ -2,13 +2,12 @@
 """Bags of other stacks through the adapters to the real nodes: the same decisions come out."""
 
 import math
-import subprocess
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 import pytest
-from ament_index_python.packages import get_package_prefix
+from commands import run
 from foreign_bags import (
     KINDS,
     OBJECT_ARRAY,
@@ -29,7 +28,6 @@ from sim_bridge.ros.recording import Stored, installed_types, read_bag
 
 BAGS = Path(__file__).resolve().parents[1] / "bags"
 RECORDED = (*topics.INPUTS, topics.DECISION)
-PATIENCE_S = 600.0
 AUTOWARE_NAMES = {
     "/odometry": "/localization/kinematic_state",
     "/objects": "/perception/object_recognition/tracking/objects",
@@ -39,17 +37,6 @@ LATER_NS = 40_000_000  # messages arrive later than the time in their header
 
 def unchanged(message: Message) -> Message:
     return message
-
-
-def run(command: str, *options: str) -> "subprocess.CompletedProcess[str]":
-    executable = Path(get_package_prefix("sim_bridge")) / "lib" / "sim_bridge" / command
-    return subprocess.run(
-        [str(executable), *options],
-        capture_output=True,
-        text=True,
-        timeout=PATIENCE_S,
-        check=False,
-    )
 
 
 def as_recorded_elsewhere(

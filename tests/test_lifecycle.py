@@ -4,7 +4,7 @@
 import hashlib
 import os
 import signal
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,41 +15,31 @@ from rclpy.node import Node
 
 from risk_dqn_planner.policies.shipped import shipped_policies
 from sim_bridge.ros import topics
-from sim_bridge.ros.process import NodeProcess
+from sim_bridge.ros.process import NodeCommand, NodeProcess
 from sim_bridge.ros.run_settings import RunSettings
-from sim_bridge.ros.session import ros_session, wait_until
+from sim_bridge.ros.session import wait_until
 
 pytestmark = pytest.mark.ros
 
 PATIENCE_S = 240.0
 END_S = 20.0
 SITUATION, POLICY = 0, 1
-Start = Callable[..., tuple[NodeProcess, LifecycleDriver]]
+Manage = Callable[..., tuple[NodeProcess, LifecycleDriver]]
 
 
 @pytest.fixture
-def node() -> Iterator[Node]:
-    with ros_session("test") as session_node:
-        yield session_node
-
-
-@pytest.fixture
-def start(node: Node, settings: RunSettings, tmp_path: Path) -> Iterator[Start]:
-    started: list[NodeProcess] = []
+def manage(
+    node: Node, start: Callable[[NodeCommand], NodeProcess], settings: RunSettings
+) -> Manage:
+    """Starts a node that waits for its manager, and gives both."""
 
     def start_one(which: int, **overrides: object) -> tuple[NodeProcess, LifecycleDriver]:
         parameters = {"use_sim_time": False, "autostart": False, **overrides}
         chosen = replace(settings, policy="rule_based", supervisor="off", overrides=parameters)
-        command = chosen.planner_commands()[which]
-        process = NodeProcess(command, tmp_path / f"{len(started)}.log")
-        started.append(process)
+        process = start(chosen.planner_commands()[which])
         return process, LifecycleDriver(node, ("situation", "policy")[which], process.check)
 
-    yield start_one
-    for process in started:
-        process.interrupt()
-    for process in started:
-        process.stop()
+    return start_one
 
 
 def end(process: NodeProcess, number: int) -> int:
@@ -61,8 +51,8 @@ def end(process: NodeProcess, number: int) -> int:
 
 
 @pytest.mark.parametrize("which", [SITUATION, POLICY], ids=["situation", "policy"])
-def test_a_node_goes_through_all_its_states_and_back(start: Start, which: int) -> None:
-    process, life = start(which)
+def test_a_node_goes_through_all_its_states_and_back(manage: Manage, which: int) -> None:
+    process, life = manage(which)
     seen = [life.state()]
     for transition in ("configure", "activate", "deactivate", "cleanup", "configure", "activate"):
         assert life.change(transition), process.output()
@@ -76,9 +66,9 @@ def test_a_node_goes_through_all_its_states_and_back(start: Start, which: int) -
 
 @pytest.mark.parametrize("which", [SITUATION, POLICY], ids=["situation", "policy"])
 def test_a_transition_that_the_state_does_not_have_is_refused_and_harms_nobody(
-    start: Start, which: int
+    manage: Manage, which: int
 ) -> None:
-    process, life = start(which)
+    process, life = manage(which)
     for transition in ("activate", "cleanup", "no_such_transition"):
         assert not life.change(transition)
     assert life.state() == "unconfigured"
@@ -88,9 +78,9 @@ def test_a_transition_that_the_state_does_not_have_is_refused_and_harms_nobody(
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=lambda s: s.name)
 @pytest.mark.parametrize("state", ["unconfigured", "configuring", "inactive", "active"])
 def test_a_node_that_is_asked_to_end_ends_without_an_error_in_every_state(
-    start: Start, state: str, number: signal.Signals
+    manage: Manage, state: str, number: signal.Signals
 ) -> None:
-    process, life = start(POLICY, policy="tuned" if state == "configuring" else "rule_based")
+    process, life = manage(POLICY, policy="tuned" if state == "configuring" else "rule_based")
     if state == "configuring":
         life.request("configure")
     elif state != "unconfigured":
@@ -102,11 +92,11 @@ def test_a_node_that_is_asked_to_end_ends_without_an_error_in_every_state(
 
 
 def test_a_managed_policy_decides_while_it_is_active_and_at_no_other_time(
-    node: Node, start: Start
+    node: Node, manage: Manage
 ) -> None:
     decisions: list[Decision] = []
     node.create_subscription(Decision, topics.DECISION.name, decisions.append, topics.DECISION.qos)
-    process, life = start(POLICY)
+    process, life = manage(POLICY)
     assert life.change("configure")
     assert decisions == []
     assert life.change("activate")
@@ -119,9 +109,9 @@ def test_a_managed_policy_decides_while_it_is_active_and_at_no_other_time(
 
 
 def test_what_cannot_be_configured_stays_unconfigured_until_it_is_corrected(
-    start: Start, settings: RunSettings
+    manage: Manage, settings: RunSettings
 ) -> None:
-    process, life = start(SITUATION, map_file="/no/such/map.osm")
+    process, life = manage(SITUATION, map_file="/no/such/map.osm")
     assert not life.change("configure")
     assert life.state() == "unconfigured"
     lines = [line for line in process.output().splitlines() if "not configured: " in line]
@@ -133,11 +123,11 @@ def test_what_cannot_be_configured_stays_unconfigured_until_it_is_corrected(
 
 
 def test_a_refused_policy_goes_on_saying_stop_until_another_one_is_configured(
-    node: Node, start: Start
+    node: Node, manage: Manage
 ) -> None:
     decisions: list[Decision] = []
     node.create_subscription(Decision, topics.DECISION.name, decisions.append, topics.DECISION.qos)
-    process, life = start(POLICY, policy="no_such_policy", autostart=True)
+    process, life = manage(POLICY, policy="no_such_policy", autostart=True)
 
     def newest() -> int | None:
         return decisions[-1].reason if decisions else None
@@ -152,14 +142,14 @@ def test_a_refused_policy_goes_on_saying_stop_until_another_one_is_configured(
 
 
 def test_a_policy_file_is_loaded_only_once_its_hash_is_trusted(
-    start: Start, tmp_path: Path
+    manage: Manage, tmp_path: Path
 ) -> None:
     # The planner's own file with a byte more: TorchScript still, but nobody's.
     data = shipped_policies()["tuned"].path.read_bytes() + b"\0"
     own = tmp_path / "own.pt"
     own.write_bytes(data)
     sha256 = hashlib.sha256(data).hexdigest()
-    process, life = start(POLICY, policy=str(own))
+    process, life = manage(POLICY, policy=str(own))
     assert not life.change("configure")
     assert f"own.pt has SHA-256 {sha256}, which no list" in process.output()
     assert life.set("trusted_policies", sha256) == "ok"
@@ -167,8 +157,8 @@ def test_a_policy_file_is_loaded_only_once_its_hash_is_trusted(
     assert process.output().count("which no list") == 1
 
 
-def test_parameters_change_at_once_or_are_refused_with_the_reason(start: Start) -> None:
-    _, life = start(POLICY)
+def test_parameters_change_at_once_or_are_refused_with_the_reason(manage: Manage) -> None:
+    _, life = manage(POLICY)
     assert life.change("configure")
     assert life.set("max_situation_age_s", 0.3) == "ok"
     assert life.set("supervisor", "enforce") == "ok"

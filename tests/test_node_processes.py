@@ -4,7 +4,7 @@
 import os
 import signal
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -21,36 +21,13 @@ from sim_bridge.ros import topics
 from sim_bridge.ros.node_group import NodeGroup
 from sim_bridge.ros.process import NodeCommand, NodeProcess
 from sim_bridge.ros.run_settings import RunSettings
-from sim_bridge.ros.session import ros_session, wait_until
+from sim_bridge.ros.session import wait_until
 
 pytestmark = pytest.mark.ros
 
 PATIENCE_S = 180.0  # where nothing is compiled yet
 
 Start = Callable[[NodeCommand], NodeProcess]
-
-
-@pytest.fixture
-def node() -> Iterator[Node]:
-    with ros_session("test") as session_node:
-        yield session_node
-
-
-@pytest.fixture
-def start(node: Node, tmp_path: Path) -> Iterator[Start]:
-    assert node.context.ok()  # processes inherit the domain of its session
-    started: list[NodeProcess] = []
-
-    def start_one(command: NodeCommand) -> NodeProcess:
-        log = tmp_path / f"{len(started)}_{command.executable}.log"
-        started.append(NodeProcess(command, log))
-        return started[-1]
-
-    yield start_one
-    for process in started:
-        process.interrupt()
-    for process in started:
-        process.stop()
 
 
 def await_ready(process: NodeProcess) -> None:

@@ -8,28 +8,21 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from ament_index_python.packages import get_package_prefix
+from commands import executable, run
 
 from sim_bridge.ros.session import wait_until
 
 pytestmark = pytest.mark.ros
 
 PATIENCE_S = 300.0
-SOAK = Path(get_package_prefix("sim_bridge")) / "lib" / "sim_bridge" / "soak"
+LIGHT = ("--policy", "rule_based", "--scenario", "demo_light")
 NODES = {"simulator_node", "situation_node", "policy_node"}
 
 
 def test_a_short_soak_finds_every_decision_in_its_place_and_measures_all_nodes(
     tmp_path: Path,
 ) -> None:
-    command = [str(SOAK), "--policy", "rule_based", "--scenario", "demo_light"]
-    done = subprocess.run(
-        [*command, "--hours", "0.012", "--out", str(tmp_path)],
-        capture_output=True,
-        text=True,
-        timeout=PATIENCE_S,
-        check=False,
-    )
+    done = run("soak", *LIGHT, "--hours", "0.012", "--out", str(tmp_path))
     found = json.loads((tmp_path / "soak.json").read_text())
     # On a busy computer there are too few samples, or too short a time, to be sure of memory.
     others = [c for c in found["complaints"] if "memory" not in c and "grows" not in c]
@@ -48,7 +41,7 @@ def test_an_interrupted_soak_writes_what_it_has_seen_and_leaves_no_node_behind(
     tmp_path: Path,
 ) -> None:
     running = subprocess.Popen(
-        [str(SOAK), "--policy", "rule_based", "--scenario", "demo_light", "--out", str(tmp_path)],
+        [executable("soak"), *LIGHT, "--out", str(tmp_path)],
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
         text=True,

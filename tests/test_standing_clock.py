@@ -2,10 +2,9 @@
 """A policy node whose /clock stands, goes on and jumps back: decisions keep coming."""
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
-from pathlib import Path
 
 import pytest
 from intersection_msgs.msg import Decision
@@ -17,9 +16,9 @@ from risk_dqn_planner.ros import conversions
 from risk_dqn_planner.situation.report import SituationReport, Status
 from risk_dqn_planner.situation.warm_up import example_situation
 from sim_bridge.ros import topics
-from sim_bridge.ros.process import NodeProcess
+from sim_bridge.ros.process import NodeCommand, NodeProcess
 from sim_bridge.ros.run_settings import RunSettings
-from sim_bridge.ros.session import ros_session, wait_until
+from sim_bridge.ros.session import wait_until
 
 pytestmark = pytest.mark.ros
 
@@ -79,20 +78,10 @@ class Driver:
 
 
 @pytest.fixture
-def node() -> Iterator[Node]:
-    with ros_session("test") as session_node:
-        yield session_node
-
-
-@pytest.fixture
-def process(node: Node, settings: RunSettings, tmp_path: Path) -> Iterator[NodeProcess]:
-    assert node.context.ok()  # the process inherits the domain of its session
+def process(start: Callable[[NodeCommand], NodeProcess], settings: RunSettings) -> NodeProcess:
     realistic = {"clock_timeout_s": 0.4, "sim_time_patience_s": 0.0}
     chosen = replace(settings, policy="always_fast", supervisor="off", overrides=realistic)
-    process = NodeProcess(chosen.planner_commands()[1], tmp_path / "policy.log")
-    yield process
-    process.interrupt()
-    process.stop()
+    return start(chosen.planner_commands()[1])
 
 
 def test_a_clock_that_stands_is_answered_with_stop_and_one_that_jumps_back_is_followed(

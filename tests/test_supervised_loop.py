@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from commands import run
 from intersection_msgs.msg import Decision
 from rclpy.serialization import deserialize_message
-from test_closed_loop import run_demo
 
 from risk_dqn_planner.decision import Action, Reason
 from risk_dqn_planner.map.loader import load_map
@@ -39,8 +39,8 @@ class Step:
 
 def in_the_nodes(folder: Path, *options: str) -> list[Decision]:
     """Drive the episode over DDS and return its decisions."""
-    done = run_demo(
-        "--map", MAP, "--episodes", "1", "--seed", str(SEED), "--supervisor", "enforce",
+    done = run(
+        "demo", "--map", MAP, "--episodes", "1", "--seed", str(SEED), "--supervisor", "enforce",
         "--out", str(folder), *options,
     )  # fmt: skip
     assert done.returncode == 0, done.stdout + done.stderr

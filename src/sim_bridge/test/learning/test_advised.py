@@ -23,14 +23,7 @@ from sim_bridge.environment.place import Places
 from sim_bridge.environment.rewards import reward_named
 from sim_bridge.environment.seeds import VALIDATION_SEEDS, fixed_seeds
 from sim_bridge.learning.checkpoint import RunFolder
-from sim_bridge.learning.config import (
-    AdviceConfig,
-    EvaluationConfig,
-    ExplorationConfig,
-    LearnerConfig,
-    ReplayConfig,
-    TrainingConfig,
-)
+from sim_bridge.learning.config import AdviceConfig, ExplorationConfig, LearnerConfig
 from sim_bridge.learning.export import initial_weights, network_of
 from sim_bridge.learning.learner import Learner
 from sim_bridge.learning.origin import origin_of
@@ -38,22 +31,14 @@ from sim_bridge.learning.run import Run
 from sim_bridge.learning.session import Score, Session
 from sim_bridge.scenarios.loading import load_scenario
 
+from .tiny import TINY
+
 pytestmark = pytest.mark.filterwarnings("ignore:.*torch.jit:DeprecationWarning")
 
 ADVISED = Run(
-    config=TrainingConfig(
-        preset="tiny",
-        steps=600,
-        environments=4,
-        batch_size=8,
-        warmup_steps=50,
-        n_step=2,
-        replay=ReplayConfig(capacity=300),
+    config=replace(
+        TINY,
         exploration=ExplorationConfig(start=0.1, end=0.1),
-        learner=LearnerConfig(learning_rate=1e-3),
-        evaluation=EvaluationConfig(
-            every_episodes=4, episodes=4, validation_every=2, validation_episodes=5
-        ),
         outlook=True,
         advice=AdviceConfig(until=0.5, capacity=200, batch_size=16),
     ),

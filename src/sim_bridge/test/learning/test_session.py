@@ -23,7 +23,6 @@ from sim_bridge.environment.place import Place, Places, load_place
 from sim_bridge.environment.rewards import reward_named
 from sim_bridge.environment.seeds import VALIDATION_SEEDS, fixed_seeds
 from sim_bridge.learning.checkpoint import RunFolder
-from sim_bridge.learning.config import EvaluationConfig, LearnerConfig, ReplayConfig, TrainingConfig
 from sim_bridge.learning.export import initial_weights, network_of
 from sim_bridge.learning.learner import Learner
 from sim_bridge.learning.origin import origin_of
@@ -32,20 +31,10 @@ from sim_bridge.learning.session import Score, Session
 from sim_bridge.learning.train import main
 from sim_bridge.scenarios.loading import load_scenario
 
+from . import tiny
+
 TINY = Run(
-    config=TrainingConfig(
-        preset="tiny",
-        steps=600,
-        environments=4,
-        batch_size=8,
-        warmup_steps=50,
-        n_step=2,
-        replay=ReplayConfig(capacity=300),
-        learner=LearnerConfig(learning_rate=1e-3),
-        evaluation=EvaluationConfig(
-            every_episodes=4, episodes=4, validation_every=2, validation_episodes=5
-        ),
-    ),
+    config=tiny.TINY,
     reward="risk_with_occlusions",
     seed=3,
     map_name="four_way",

@@ -15,6 +15,8 @@ endif
 BOOTSTRAP := $(HOST_PYTHON) tools/bootstrap.py
 WITH_TOOLS := $(BOOTSTRAP) --no-build --
 WITH_ROS := $(BOOTSTRAP) --
+# Files of tests side by side, one for each processor; ARGS='-n 0' takes them one after another.
+SIDE_BY_SIDE := -n auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder
 SIMULATION := install/sim_bridge/lib/sim_bridge
 PYTHON_SOURCES := src/risk_dqn_planner src/sim_bridge tests tools bench examples
 TYPED_SOURCES := src/risk_dqn_planner/risk_dqn_planner src/sim_bridge/sim_bridge tools bench \
@@ -52,7 +54,7 @@ demo: ## drive episodes over DDS [MAP ROUTE ORIGIN PROJECTOR POLICY SCENARIO EPI
 	@$(WITH_ROS) $(SIMULATION)/demo $(RUN_OPTIONS) $(ARGS)
 
 test: ## run all tests, those with real nodes too [ARGS='-k name']
-	@$(WITH_ROS) python -m pytest $(ARGS)
+	@$(WITH_ROS) python -m pytest $(SIDE_BY_SIDE) $(ARGS)
 
 replay: ## feed a bag to the real nodes and compare decisions: BAG=bags/...
 	@$(if $(BAG),,echo 'error: say which bag, for example make replay BAG=bags/four_way' >&2; exit 2)

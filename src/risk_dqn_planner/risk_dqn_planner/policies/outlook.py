@@ -4,11 +4,15 @@
     action in force | sound actions | margins of going on after each action | next place | forecast
     3, one is 1     | 3, 0 or 1     | 3                                     | 4          | 3 x K
 
+    creeping | way left after each action | what of it hops cannot fill
+    0 or 1   | 3                          | 3
+
 The margins are the joint check's, if the ego goes on through everything after the action; the
 forecast is that of going after k periods of waiting, in three ways. The next place is where the
 ego can wait: the way to the next zone, to the place, through the zones behind it, and whether it
-joins a lane there. The same object serves a batch in training and a batch of one on the vehicle;
-rows are independent.
+joins a lane there. Creeping is 1 where the ego will not see enough before it stands at that place,
+so that decimetres matter: then the network has to choose hops that end there. The same object
+serves a batch in training and a batch of one on the vehicle; rows are independent.
 """
 
 import math
@@ -20,7 +24,15 @@ from numpy.typing import NDArray
 
 from risk_dqn_planner.compiled import kernel
 from risk_dqn_planner.errors import ConfigurationError
-from risk_dqn_planner.policies.foresight.forecast import WAYS_TO_WAIT, Place, forecast, next_place
+from risk_dqn_planner.policies.foresight.creeping import FAR_M, short_of
+from risk_dqn_planner.policies.foresight.forecast import (
+    WAYS_TO_WAIT,
+    Place,
+    forecast,
+    next_place,
+    reached,
+    travelled,
+)
 from risk_dqn_planner.policies.foresight.sight import SightLines
 from risk_dqn_planner.policies.foresight.task import (
     SearchNumbers,
@@ -29,6 +41,7 @@ from risk_dqn_planner.policies.foresight.task import (
     work_fit_for,
     work_for,
 )
+from risk_dqn_planner.policies.foresight.waiting import decimetres_matter, find_places
 from risk_dqn_planner.safety.assumptions import SafetyAssumptions, SafetyNumbers
 from risk_dqn_planner.safety.course import begin_course
 from risk_dqn_planner.safety.guard import Guard
@@ -38,12 +51,18 @@ from risk_dqn_planner.situation.situations import Booleans, Floats, Integers, Si
 
 Inputs = NDArray[np.float32]
 
+_ROUNDING = 1e-6
+
 LAYOUT = (
     "action in force (3), sound (3), margins of going (3), next place (free, rest, zones, joins), "
-    "margins of going after k periods of (Stop, Slow, coming nearer)"
+    "margins of going after k periods of (Stop, Slow, coming nearer), creeping, "
+    "way left after each action (3), shortfall after each action (3)"
 )
 _IN_FORCE, _SOUND, _GOING, _PLACE = 0, ACTIONS, 2 * ACTIONS, 3 * ACTIONS
 _LATER = _PLACE + 4
+_CREEPING = 1 + 2 * ACTIONS
+# A shortfall is below the shortest hop, which is about this.
+_MOST_SHORT_M = 0.3
 
 
 @dataclass(frozen=True)
@@ -78,7 +97,7 @@ class OutlookConfig:
     @property
     def size(self) -> int:
         """How many numbers there are for each situation."""
-        return _LATER + WAYS_TO_WAIT * self.periods
+        return _LATER + WAYS_TO_WAIT * self.periods + _CREEPING
 
 
 class Views(NamedTuple):
@@ -188,6 +207,7 @@ def look_into(
             for k in range(periods):
                 at = _LATER + action * periods + k
                 inputs[row, at] = share_of(later_s[action, k], most_s)
+        tell_hops(t, place, w, inputs[row, inputs.shape[1] - _CREEPING :])
 
 
 @kernel
@@ -205,3 +225,24 @@ def tell_place(place: Place, most_m: float, inputs: Inputs) -> None:
     if place.rest_m < math.inf:
         inputs[2] = min((place.clear_m - place.rest_m) / (0.5 * most_m), 1.0)
         inputs[3] = 1.0 if place.joins else 0.0
+
+
+@kernel
+def tell_hops(t: Task, place: Place, w: Work, inputs: Inputs) -> None:
+    """Fill what the network is told of creeping to the next place (7,).
+
+    Ways are told up to FAR_M; where nothing is to be crept to, or the ego would rest beyond it, a
+    way is -1 and a shortfall 1.
+    """
+    inputs[0] = 1.0 if decimetres_matter(t, w.places, find_places(t, w.places)) else 0.0
+    p, now_mps = t.p, max(t.s.ego_speed_mps[t.row], 0.0)
+    for action in range(ACTIONS):
+        target_mps = target_of(action, p)
+        mps = reached(now_mps, target_mps, p.period_s, p)
+        rests_m = travelled(now_mps, target_mps, p.period_s, p) + 0.5 * mps * mps / p.ego_down_mps2
+        left_m = place.rest_m - rests_m
+        inputs[1 + action], inputs[1 + ACTIONS + action] = -1.0, 1.0
+        if -_ROUNDING <= left_m < math.inf:
+            short_m = short_of(w.shortfall_m, max(left_m, 0.0))
+            inputs[1 + action] = min(left_m / FAR_M, 1.0)
+            inputs[1 + ACTIONS + action] = min(short_m / _MOST_SHORT_M, 1.0)

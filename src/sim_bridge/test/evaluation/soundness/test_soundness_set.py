@@ -8,7 +8,7 @@ import pytest
 from sim_bridge.evaluation import campaign, evaluate
 from sim_bridge.evaluation.soundness.beam import BeamConfig
 from sim_bridge.evaluation.soundness.evaluate import Plan
-from sim_bridge.evaluation.soundness.reporting.tables import outcome
+from sim_bridge.evaluation.soundness.reporting.tables import at_a_glance, outcome
 
 OPTIONS = [
     "--set", "soundness", "--episodes", "6", "--limit-episodes", "2", "--map", "four_way",
@@ -56,7 +56,7 @@ def test_lines_hold_limits_and_causes_beside_the_usual_figures(folder: Path) -> 
 
 def test_the_page_shows_every_part_that_was_driven(folder: Path) -> None:
     page = (folder / "page.md").read_text()
-    for title in ("Collisions", "What is possible", "With memory", "Accepted risk"):
+    for title in ("At a glance", "Collisions", "What is possible", "With memory", "Accepted risk"):
         assert f"## {title}" in page
     assert (folder / "images" / "soundness" / "accepted_risk.png").stat().st_size > 0
 
@@ -93,3 +93,14 @@ def test_policies_that_search_drive_fewer_episodes_but_all_whose_limits_are_sear
     assert plan.limited == 300
     small = Plan(Path("out"), episodes=50, search_episodes=20, limit_episodes=300)
     assert (small.episodes_of("look_ahead"), small.limited) == (20, 20)
+
+
+def test_a_glance_takes_the_mean_of_the_cells_and_all_collisions() -> None:
+    share, speed = {"rate": 0.1}, {"mean": 4.0}
+    first = {
+        "policy": "brave", "episodes": 100, "success": {"rate": 1.0}, "collision": {"rate": 0.0},
+        "mean_speed_mps": speed, "switch_share": share, "hard_brake_share": share,
+    }  # fmt: skip
+    second = {**first, "success": {"rate": 0.5}, "collision": {"rate": 0.03}}
+    row = at_a_glance([first, {**second, "mean_speed_mps": {"mean": 2.0}}]).splitlines()[-1]
+    assert row == "| brave | 2 | 75.0 | 3.00 | 10.0 | 10.0 | 3 |"

@@ -16,6 +16,7 @@ from sim_bridge.evaluation.soundness.reporting.tables import (
     LIMITS,
     SPEED_WANTED,
     SUCCESS_WANTED,
+    at_a_glance,
     by_map,
     by_traffic,
     collisions_in_all,
@@ -46,8 +47,15 @@ policies that search at each decision drive the first ones only. Brackets hold 9
 *Centre* and *front* say where the sensor is on the ego; where speeds are perceived with noise the
 check allows for errors of 4 standard deviations.
 
-`fastest_sound`, `look_ahead` and whatever ends in `+supervisor` take sound actions only. The
-others are there for contrast.
+`fastest_sound`, `look_ahead`, `sound_dqn` and whatever ends in `+supervisor` take sound actions
+only. The others are there for contrast.
+"""
+
+_GLANCE = """\
+## At a glance
+
+Means over all cells with the sensor at the ego's centre, each cell counting as much as any other. A
+hard brake takes more than 1 m/s off in one decision.
 """
 
 _LIMITS = """\
@@ -132,6 +140,8 @@ def _promise(lines: Sequence[Line]) -> str:
     tables = [by_map(lines, policy, outcome, f"`{policy}`") for policy in policies_of(lines)]
     return "\n".join(
         (
+            _GLANCE,
+            at_a_glance([line for line in lines if line["sensor_forward_m"] == 0.0]),
             "## Collisions\n",
             collisions_in_all(lines),
             "## Success / collision / timeout in %\n",

@@ -153,6 +153,31 @@ def smoothness(lines: Sequence[Line]) -> str:
     return table(header, rows)
 
 
+def at_a_glance(lines: Sequence[Line]) -> str:
+    """Return how each policy does over all cells together: means of the cells' own means."""
+    keys = {
+        "success": 100.0,
+        "mean_speed_mps": 1.0,
+        "switch_share": 100.0,
+        "hard_brake_share": 100.0,
+    }
+    rows = []
+    for policy in policies_of(lines):
+        own = [line for line in lines if line["policy"] == policy]
+        means = [
+            factor * sum(center_of(line[key]) for line in own) / len(own)
+            for key, factor in keys.items()
+        ]
+        success, mps, changes, brakes = means
+        figures = (f"{success:.1f}", f"{mps:.2f}", f"{changes:.1f}", f"{brakes:.1f}")
+        rows.append([policy, str(len(own)), *figures, str(sum(map(count, own)))])
+    header = [
+        "policy", "cells", "success, %", "mean speed, m/s", "decisions that change, %",
+        "hard brakes, %", "collisions",
+    ]  # fmt: skip
+    return table(header, rows)
+
+
 def collisions_in_all(lines: Sequence[Line]) -> str:
     """Return collisions over all cells whose assumptions hold, and the cells that had any."""
     rows = []

@@ -2,13 +2,14 @@
 """Drives the set `soundness`: policies and limits in all cells, timeouts classified."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from rich.console import Console
 
 from risk_dqn_planner.errors import ConfigurationError, UnknownPolicyError
+from risk_dqn_planner.policies.fingerprint import fingerprint
 from risk_dqn_planner.safety.assumptions import SafetyAssumptions
 from sim_bridge.environment.place import Places
 from sim_bridge.evaluation.campaign import Campaign, versions
@@ -92,11 +93,17 @@ class _Work:
     clairvoyant: Clairvoyant = field(default_factory=Clairvoyant)
     places: dict[str, Places] = field(default_factory=dict)
 
-    def campaign(self, map_name: str, episodes: int) -> Campaign:
-        """Return what drives so many episodes on a map, the first ones compared with the limits."""
+    def campaign(self, cell: SoundnessCell, episodes: int) -> Campaign:
+        """Return what drives so many episodes in a cell, the first ones compared with the limits.
+
+        What the cell assumes keeps its results apart: the hash of a learned policy is that of its
+        file, whatever it takes for granted.
+        """
+        map_name = cell.map_name
         if map_name not in self.places:
             self.places[map_name] = Places.named(map_name)
-        store = Store(self.plan.output / "cells")
+        assumed = fingerprint(asdict(cell.assumptions))[:16]
+        store = Store(self.plan.output / "cells" / assumed)
         return Campaign(self.places[map_name], episodes, store, self.plan.limited)
 
 
@@ -118,7 +125,7 @@ def run(plan: Plan, console: Console) -> tuple[dict[str, Any], list[Line]]:
             for driver, episodes in _who(cell, work):
                 where = f"{cell.map_name} {cell.cell.scenario}"
                 progress.update(task, description=f"{driver.name} {where}")
-                campaign = work.campaign(cell.map_name, episodes)
+                campaign = work.campaign(cell, episodes)
                 line = campaign.result(
                     driver, cell.cell, lambda count: progress.advance(task, count)
                 )
@@ -163,7 +170,7 @@ def _who(cell: SoundnessCell, work: _Work) -> list[tuple[Contestant, int]]:
     plan, limited = work.plan, work.plan.limited
     found: list[tuple[Contestant, int]] = []
     if cell.limits:
-        place = work.campaign(cell.map_name, limited).places.of(cell.cell.load())
+        place = work.campaign(cell, limited).places.of(cell.cell.load())
         found += [
             (PhysicalLimit(place, work.clairvoyant), limited),
             (SoundLimit(place, cell.assumptions), limited),

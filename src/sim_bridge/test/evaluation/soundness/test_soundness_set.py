@@ -12,7 +12,7 @@ from sim_bridge.evaluation.soundness.reporting.tables import at_a_glance, outcom
 
 OPTIONS = [
     "--set", "soundness", "--episodes", "6", "--limit-episodes", "2", "--map", "four_way",
-    "--scenarios", "severe_occlusion", "--policies", "fastest_sound,rule_based",
+    "--scenarios", "severe_occlusion", "--policies", "fastest_sound,sound_dqn,rule_based",
 ]  # fmt: skip
 
 
@@ -40,7 +40,7 @@ def _narrow(self: BeamConfig) -> None:
 def test_lines_hold_limits_and_causes_beside_the_usual_figures(folder: Path) -> None:
     lines = json.loads((folder / "results.json").read_text())["cells"]
     goal = [line for line in lines if line["part"] == "goal"]
-    names = ["clairvoyant", "sound_limit", "fastest_sound", "rule_based"]
+    names = ["clairvoyant", "sound_limit", "fastest_sound", "sound_dqn", "rule_based"]
     assert [line["policy"] for line in goal] == names * 2
     for line in goal:
         assert line["episodes"] == (2 if line["policy"] in names[:2] else 6)
@@ -52,6 +52,18 @@ def test_lines_hold_limits_and_causes_beside_the_usual_figures(folder: Path) -> 
         assert {"success", "mean_speed_mps", "switch_share", "hard_brake_share"} <= line.keys()
     frontier = [line for line in lines if line["part"] == "frontier"]
     assert [line["policy"] for line in frontier].count("fastest_sound") == 2 * 8
+
+
+@pytest.mark.parametrize("policy", ["fastest_sound", "sound_dqn"])
+def test_who_thinks_hidden_vehicles_slow_drives_otherwise(folder: Path, policy: str) -> None:
+    lines = json.loads((folder / "results.json").read_text())["cells"]
+    speeds = {
+        line["mean_speed_mps"]["mean"]
+        for line in lines
+        if line["part"] == "frontier" and line["policy"] == policy
+        if line["hidden_top_speed_mps"] in (0.0, 4.0, 100.0)
+    }
+    assert len(speeds) >= 3
 
 
 def test_the_page_shows_every_part_that_was_driven(folder: Path) -> None:

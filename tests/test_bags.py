@@ -42,13 +42,14 @@ def decisions_of(name: str) -> list[Decision]:
 
 @pytest.fixture(scope="module")
 def replays(request: pytest.FixtureRequest) -> dict[str, "Future[Done]"]:
-    """Replays of the bags that are asked for, as many at a time as there are processors."""
+    """Replays of the bags that are asked for, as many at a time as this process has processors."""
     asked = [
         item.callspec.params["replayed"]  # type: ignore[attr-defined]
         for item in request.session.items
         if "replays" in getattr(item, "fixturenames", ())
     ]
-    pool = ThreadPoolExecutor(max(os.cpu_count() or 1, 2))
+    beside = int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1"))
+    pool = ThreadPoolExecutor(max((os.cpu_count() or 1) // beside, 1))
     return {name: pool.submit(run_replay, str(BAGS / name)) for name in asked}
 
 

@@ -145,7 +145,7 @@ class Decider:
         self._decided_ns = 0  # when it saw that first
         self._choice: Choice | None = None  # its answer to that
         self._trouble: Trouble | None = None  # the last one, as long as it bears on decisions
-        self._troubled_ns = 0
+        self._good_since_ns: int | None = None  # stamp of the first good report after it
         self._untold: Trouble | None = None  # one that no decision has told of yet
 
     def reconfigure(self, config: DeciderConfig) -> None:
@@ -159,13 +159,15 @@ class Decider:
         if errand != self._errand:
             self._begin(errand)
         if report.situations is None:
-            self.doubt(Trouble(Reason(report.status), report.source, report.text), now_ns)
+            self.doubt(Trouble(Reason(report.status), report.source, report.text))
             return
         fault = self.stream.receive(report.stamp_ns, report, now_ns, steady_ns)
         if fault is not None:
-            self.doubt(_as_trouble(fault), now_ns)
+            self.doubt(_as_trouble(fault))
             if fault.status is Status.OUT_OF_ORDER_INPUT:
                 self.forget()
+        elif self._good_since_ns is None:
+            self._good_since_ns = report.stamp_ns
 
     def has_reached(self, stamp_ns: int) -> bool:
         """Tell whether the newest report is of this time or later."""
@@ -184,14 +186,19 @@ class Decider:
         self.stream.forget_later_than(latest_ns)
         if self._report is not None and self._report.stamp_ns > latest_ns:
             self._report = None
-        self._troubled_ns = min(self._troubled_ns, now_ns)
+        if self._good_since_ns is not None:
+            self._good_since_ns = min(self._good_since_ns, now_ns)
 
-    def doubt(self, trouble: Trouble, now_ns: int) -> None:
-        """Take note of trouble: the next decision tells of it, and recovery begins after it."""
+    def doubt(self, trouble: Trouble) -> None:
+        """Take note of trouble: the next decision tells of it, and recovery begins after it.
+
+        It begins with the next good report and not with the last complaint: how often a fault is
+        complained of depends on how busy the computer is.
+        """
         if trouble.reason in _SETTLED_BY_ERRAND and not self._started:
             return  # this is how every errand begins
         self._trouble = self._untold = trouble
-        self._troubled_ns = now_ns
+        self._good_since_ns = None
 
     def decide(self, now_ns: int, steady_ns: int = 0, trouble: Trouble | None = None) -> Choice:
         """Return the decision at a time on the clock of the stamps [ns].
@@ -203,7 +210,7 @@ class Decider:
             return self._stop(Trouble(policy.reason, policy.source, policy.fault))
         present = trouble or self._present(now_ns, steady_ns)
         if present is not None:
-            self.doubt(present, now_ns)
+            self.doubt(present)
         told = present or self._untold or self._recovering(now_ns)
         self._untold = None
         if told is not None:
@@ -239,7 +246,8 @@ class Decider:
         """Return why it is too early to ask the policy again."""
         if self._trouble is None:
             return None
-        good_s = (now_ns - self._troubled_ns) / SECOND_NS
+        since_ns = now_ns if self._good_since_ns is None else self._good_since_ns
+        good_s = (now_ns - since_ns) / SECOND_NS
         if good_s >= self.config.recovery_s:
             self._trouble = None
             return None
@@ -264,7 +272,7 @@ class Decider:
             self.forget()
             text = f"policy {policy.name} failed: {type(error).__name__}: {error}"
             failed = Trouble(Reason.POLICY_FAILED, FaultyInput.POLICY, " ".join(text.split()))
-            self.doubt(failed, now_ns)
+            self.doubt(failed)
             self._untold = None
             return self._stop(failed, report)
         self._decided, self._decided_ns, self._started = report, now_ns, True

@@ -22,7 +22,7 @@ OLDEST_DECISION_S = 1.0
 # Nodes read /clock best effort: a lost time is sent again while an answer to it is awaited.
 _CLOCK_AGAIN_S = 0.1
 # Where nothing is awaited, nodes get this much time to see the clock and say so.
-_NOTICE_S = 0.03
+_NOTICE_S = 0.1
 _PAUSE_STEP_NS = SECOND_NS // 10
 
 

@@ -82,7 +82,8 @@ def test_the_ego_drives_again_once_inputs_have_been_back_for_a_second(
     assert planner.decide(FREE).action == Decision.FAST
     for _ in range(3):
         assert planner.wait().action == Decision.STOP
-    assert planner.decide(FREE).reason == Decision.RECOVERING
+    for _ in range(2):
+        assert planner.decide(FREE).reason == Decision.RECOVERING
     assert planner.decide(FREE).action == Decision.FAST
 
 
@@ -94,7 +95,8 @@ def test_a_number_that_is_none_stops_the_ego_and_is_named(planner: PlannerDriver
     assert (decision.reason, decision.faulty_input) == (Decision.NOT_FINITE, Decision.ODOMETRY)
     assert "speed_mps is nan" in decision.text
     assert planner.situation().status == Situation.NOT_FINITE
-    assert planner.decide(FREE).reason == Decision.RECOVERING
+    for _ in range(2):
+        assert planner.decide(FREE).reason == Decision.RECOVERING
     assert planner.decide(FREE).action == Decision.FAST
 
 

@@ -156,7 +156,12 @@ class SituationNode(ManagedNode):
             if not self._working:
                 return
             if read is not None:
-                message = read(message)
+                try:
+                    message = read(message)
+                except ValueError as error:
+                    # It counts as not received, as one that rclpy cannot read does.
+                    self._complain(f"{source} cannot be read: {error}")
+                    return
             stamp_ns = conversions.to_ns(message.header.stamp)
             now, steady = now_ns(self), time.monotonic_ns()
             self._synchroniser.receive(source, stamp_ns, message, now, steady)

@@ -30,8 +30,7 @@ from risk_dqn_planner.policies.foresight.forecast import (
     Place,
     forecast,
     next_place,
-    reached,
-    travelled,
+    rests_at,
 )
 from risk_dqn_planner.policies.foresight.sight import SightLines
 from risk_dqn_planner.policies.foresight.task import (
@@ -41,7 +40,6 @@ from risk_dqn_planner.policies.foresight.task import (
     work_fit_for,
     work_for,
 )
-from risk_dqn_planner.policies.foresight.waiting import decimetres_matter, find_places
 from risk_dqn_planner.safety.assumptions import SafetyAssumptions, SafetyNumbers
 from risk_dqn_planner.safety.course import begin_course
 from risk_dqn_planner.safety.guard import Guard
@@ -234,13 +232,10 @@ def tell_hops(t: Task, place: Place, w: Work, inputs: Inputs) -> None:
     Ways are told up to FAR_M; where nothing is to be crept to, or the ego would rest beyond it, a
     way is -1 and a shortfall 1.
     """
-    inputs[0] = 1.0 if decimetres_matter(t, w.places, find_places(t, w.places)) else 0.0
-    p, now_mps = t.p, max(t.s.ego_speed_mps[t.row], 0.0)
+    inputs[0] = 1.0 if place.creeping else 0.0
+    now_mps = max(t.s.ego_speed_mps[t.row], 0.0)
     for action in range(ACTIONS):
-        target_mps = target_of(action, p)
-        mps = reached(now_mps, target_mps, p.period_s, p)
-        rests_m = travelled(now_mps, target_mps, p.period_s, p) + 0.5 * mps * mps / p.ego_down_mps2
-        left_m = place.rest_m - rests_m
+        left_m = place.rest_m - rests_at(0.0, now_mps, target_of(action, t.p), t.p)
         inputs[1 + action], inputs[1 + ACTIONS + action] = -1.0, 1.0
         if -_ROUNDING <= left_m < math.inf:
             short_m = short_of(w.shortfall_m, max(left_m, 0.0))

@@ -13,7 +13,7 @@ from typing import NamedTuple
 from risk_dqn_planner.compiled import kernel
 from risk_dqn_planner.policies.foresight.prediction import look_from, predict
 from risk_dqn_planner.policies.foresight.task import Task, Work
-from risk_dqn_planner.policies.foresight.waiting import find_places, free_way
+from risk_dqn_planner.policies.foresight.waiting import decimetres_matter, find_places, free_way
 from risk_dqn_planner.risk.motion import distance_after, speed_after
 from risk_dqn_planner.safety.assumptions import SafetyNumbers
 from risk_dqn_planner.safety.course import begin_course
@@ -30,13 +30,15 @@ class Place(NamedTuple):
     """Where the ego will wait next, if it has to: ways [m] from now on, infinity if nowhere.
 
     free_m: the way up to the next zone. rest_m: to the place. clear_m: to the end of the zones
-    behind it, up to another place. joins: it waits to join a lane.
+    behind it, up to another place. joins: it waits to join a lane. creeping: it will not see
+    enough before it stands there, so that decimetres matter.
     """
 
     free_m: float
     rest_m: float
     clear_m: float
     joins: bool
+    creeping: bool
 
 
 @kernel
@@ -50,7 +52,7 @@ def next_place(t: Task, w: Work) -> Place:
         if stops_m - _ROUNDING <= w.places.rest_m[j] < rest_m:
             rest_m, clear_m = w.places.rest_m[j], w.places.clear_m[j]
             joins = w.places.joins[j]
-    return Place(free_m, rest_m, clear_m, joins)
+    return Place(free_m, rest_m, clear_m, joins, decimetres_matter(t, w.places, count))
 
 
 @kernel
@@ -86,12 +88,17 @@ def nearing_speed(way_m: float, mps: float, limit_m: float, p: SafetyNumbers) ->
     """Return the speed of the fastest action after which the ego can rest before a limit."""
     for slower in range(ACTIONS - 1):
         target_mps = target_of(ACTIONS - 1 - slower, p)
-        then_mps = reached(mps, target_mps, p.period_s, p)
-        stops_m = way_m + travelled(mps, target_mps, p.period_s, p)
-        stops_m += 0.5 * then_mps * then_mps / p.ego_down_mps2
-        if stops_m <= limit_m:
+        if rests_at(way_m, mps, target_mps, p) <= limit_m:
             return target_mps
     return 0.0
+
+
+@kernel
+def rests_at(way_m: float, mps: float, target_mps: float, p: SafetyNumbers) -> float:
+    """Return where an ego can rest that heads for a speed for a period, and brakes then."""
+    then_mps = reached(mps, target_mps, p.period_s, p)
+    stops_m = way_m + travelled(mps, target_mps, p.period_s, p)
+    return stops_m + 0.5 * then_mps * then_mps / p.ego_down_mps2
 
 
 @kernel

@@ -4,13 +4,14 @@
 import hashlib
 import platform
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from typing import Any
 
 import numpy as np
 
 from risk_dqn_planner.errors import ScenarioError
+from risk_dqn_planner.safety.assumptions import SafetyAssumptions
 from sim_bridge.environment.place import Place, Places
 from sim_bridge.environment.seeds import TEST_SEEDS, fixed_seeds
 from sim_bridge.evaluation.cells import Cell, what_is_drawn
@@ -30,12 +31,15 @@ class Campaign:
     """Where, on how many episodes of the test range, and where finished cells are kept.
 
     first: of how many of the first episodes to tell the outcomes one by one, `summarise_first`.
+    assumptions: of whoever drives, where a cell has its own; the hash of a learned policy is that
+    of its file, whatever it takes for granted.
     """
 
     places: Places
     episodes: int
     store: Store
     first: int = 0
+    assumptions: SafetyAssumptions | None = None
 
     def result(self, driver: Contestant, cell: Cell, advance: Advance) -> dict[str, Any]:
         """Return one line of results.json, driving the episodes unless they were driven before.
@@ -54,6 +58,7 @@ class Campaign:
             "memory": cell.memory,
             "episodes": self.episodes,
             "first": self.first,
+            "assumptions": None if self.assumptions is None else asdict(self.assumptions),
             "sources": sources_fingerprint(),
         }
         figures = self.store.get(work)

@@ -2,14 +2,13 @@
 """Drives the set `soundness`: policies and limits in all cells, timeouts classified."""
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from rich.console import Console
 
 from risk_dqn_planner.errors import ConfigurationError, UnknownPolicyError
-from risk_dqn_planner.policies.fingerprint import fingerprint
 from risk_dqn_planner.safety.assumptions import SafetyAssumptions
 from sim_bridge.environment.place import Places
 from sim_bridge.evaluation.campaign import Campaign, versions
@@ -94,17 +93,12 @@ class _Work:
     places: dict[str, Places] = field(default_factory=dict)
 
     def campaign(self, cell: SoundnessCell, episodes: int) -> Campaign:
-        """Return what drives so many episodes in a cell, the first ones compared with the limits.
-
-        What the cell assumes keeps its results apart: the hash of a learned policy is that of its
-        file, whatever it takes for granted.
-        """
-        map_name = cell.map_name
-        if map_name not in self.places:
-            self.places[map_name] = Places.named(map_name)
-        assumed = fingerprint(asdict(cell.assumptions))[:16]
-        store = Store(self.plan.output / "cells" / assumed)
-        return Campaign(self.places[map_name], episodes, store, self.plan.limited)
+        """Return what drives so many episodes in a cell; the first are held against the limits."""
+        if cell.map_name not in self.places:
+            self.places[cell.map_name] = Places.named(cell.map_name)
+        store = Store(self.plan.output / "cells")
+        places, first = self.places[cell.map_name], self.plan.limited
+        return Campaign(places, episodes, store, first, cell.assumptions)
 
 
 def run(plan: Plan, console: Console) -> tuple[dict[str, Any], list[Line]]:

@@ -20,24 +20,36 @@ from sim_bridge.learning.config import (
     TrainingConfig,
 )
 
-# Under the supervisor collisions are out of the question, so there is time to try things.
-_SUPERVISED = TrainingConfig(
-    preset="supervised",
-    steps=1_500_000,
+_TUNED = TrainingConfig(
+    preset="tuned",
+    steps=500_000,
     environments=64,
-    updates_per_step=2,
+    updates_per_step=1,
     batch_size=256,
     warmup_steps=5_000,
     gamma=0.99,
     n_step=5,
-    replay=ReplayConfig(capacity=200_000),
-    exploration=ExplorationConfig(start=1.0, end=0.02, share=0.4, repeat=0.8),
+    replay=ReplayConfig(capacity=100_000),
+    exploration=ExplorationConfig(start=1.0, end=0.02, share=0.3),
     learner=LearnerConfig(
         learning_rate=1e-3,
-        learning_rate_end=3e-5,
+        learning_rate_end=1e-4,
         target_rate=0.01,
         max_gradient_norm=10.0,
     ),
+    evaluation=EvaluationConfig(
+        every_episodes=1_000, episodes=20, validation_every=2, validation_episodes=2_000
+    ),
+)
+# Under the supervisor collisions are out of the question, so there is time to try things.
+_SUPERVISED = replace(
+    _TUNED,
+    preset="supervised",
+    steps=1_500_000,
+    updates_per_step=2,
+    replay=ReplayConfig(capacity=200_000),
+    exploration=ExplorationConfig(start=1.0, end=0.02, share=0.4, repeat=0.8),
+    learner=replace(_TUNED.learner, learning_rate_end=3e-5),
     evaluation=EvaluationConfig(
         every_episodes=2_000, episodes=20, validation_every=3, validation_episodes=2_000
     ),
@@ -69,27 +81,7 @@ PRESETS = {
         learner=LearnerConfig(learning_rate=1e-5, learning_rate_end=1e-5, target_rate=0.2),
         evaluation=EvaluationConfig(every_episodes=50, episodes=20, validation_episodes=2_000),
     ),
-    "tuned": TrainingConfig(
-        preset="tuned",
-        steps=500_000,
-        environments=64,
-        updates_per_step=1,
-        batch_size=256,
-        warmup_steps=5_000,
-        gamma=0.99,
-        n_step=5,
-        replay=ReplayConfig(capacity=100_000),
-        exploration=ExplorationConfig(start=1.0, end=0.02, share=0.3),
-        learner=LearnerConfig(
-            learning_rate=1e-3,
-            learning_rate_end=1e-4,
-            target_rate=0.01,
-            max_gradient_norm=10.0,
-        ),
-        evaluation=EvaluationConfig(
-            every_episodes=1_000, episodes=20, validation_every=2, validation_episodes=2_000
-        ),
-    ),
+    "tuned": _TUNED,
     "supervised": _SUPERVISED,
     "advised": _ADVISED,
 }

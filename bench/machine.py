@@ -51,6 +51,12 @@ def processor() -> str:
     return names[0] if names else platform.processor() or platform.machine()
 
 
+def system() -> str:
+    """Return the kernel's name, its version without what a distribution adds, and the machine."""
+    about = platform.uname()
+    return f"{about.system} {about.release.partition('-')[0]} {about.machine}"
+
+
 def describe(core: int) -> dict[str, Any]:
     """Return the machine, and how busy it was with other work."""
     return {
@@ -58,6 +64,6 @@ def describe(core: int) -> dict[str, Any]:
         "cores": os.cpu_count(),
         "core_used": core,
         "load_average_at_start": os.getloadavg()[0],
-        "system": platform.platform(),
+        "system": system(),
         "begun": datetime.now(timezone.utc).isoformat(timespec="seconds"),
     }

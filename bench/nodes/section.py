@@ -32,6 +32,7 @@ DRIVES = (
 )
 # Policies and what their supervisor does.
 POLICIES = (
+    ("sound_dqn", "off"),
     ("tuned", "off"),
     ("tuned", "report"),
     ("tuned", "enforce"),

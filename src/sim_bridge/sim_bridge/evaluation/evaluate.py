@@ -59,6 +59,11 @@ def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
         help=f"of them, those that look_ahead drives ({SOUNDNESS}) [%(default)s]",
     )
     add(
+        "--greedy-episodes",
+        type=int,
+        help=f"that fastest_sound drives where nobody may collide ({SOUNDNESS}) [as --episodes]",
+    )
+    add(
         "--limit-episodes",
         type=int,
         default=LIMIT_EPISODES,
@@ -196,8 +201,14 @@ def _soundness(arguments: argparse.Namespace, console: Console) -> None:
         )
     }
     episodes = EPISODES if arguments.episodes is None else arguments.episodes
-    searched = arguments.search_episodes
-    plan = Plan(arguments.output, episodes, searched, arguments.limit_episodes, **chosen)
+    plan = Plan(
+        arguments.output,
+        episodes,
+        arguments.search_episodes,
+        arguments.limit_episodes,
+        arguments.greedy_episodes,
+        **chosen,
+    )
     # Matplotlib takes a second to load, too long for --help.
     from sim_bridge.evaluation.soundness.reporting.page import write_soundness  # noqa: PLC0415
 

@@ -15,6 +15,8 @@ from sim_bridge.evaluation.campaign import Campaign, versions
 from sim_bridge.evaluation.progress import progress_on
 from sim_bridge.evaluation.rollout import Clairvoyant, Contestant
 from sim_bridge.evaluation.soundness.cells import (
+    FASTEST_SOUND,
+    GOAL,
     SEARCHING,
     SoundnessCell,
     missing_scenarios,
@@ -36,7 +38,8 @@ class Plan:
     """How much of the set is driven.
 
     search_episodes: the first ones, for policies that search at each decision; limit_episodes:
-    the first ones of those, for the limits.
+    the first ones of those, for the limits. greedy_episodes: for fastest_sound, which is cheap, in
+    the cells where nobody sound may collide; None for as many as the others.
 
     maps, scenarios, policies: only these; empty for all. output: folder of finished cells.
     """
@@ -45,14 +48,16 @@ class Plan:
     episodes: int = EPISODES
     search_episodes: int = SEARCH_EPISODES
     limit_episodes: int = LIMIT_EPISODES
+    greedy_episodes: int | None = None
     maps: tuple[str, ...] = ()
     scenarios: tuple[str, ...] = ()
     policies: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        for name in ("episodes", "search_episodes", "limit_episodes"):
-            if getattr(self, name) < 1:
-                raise ConfigurationError(f"{name} is {getattr(self, name)}, expected 1 or more")
+        for name in ("episodes", "search_episodes", "limit_episodes", "greedy_episodes"):
+            count = getattr(self, name)
+            if count is not None and count < 1:
+                raise ConfigurationError(f"{name} is {count}, expected 1 or more")
 
     def cells(self) -> list[SoundnessCell]:
         """Return the cells to be driven, each with its policies.
@@ -70,9 +75,13 @@ class Plan:
             raise ConfigurationError("no cell of the set is left by maps, scenarios and policies")
         return chosen
 
-    def episodes_of(self, policy: str) -> int:
-        """Return how many episodes of each cell a policy drives."""
-        return min(self.episodes, self.search_episodes) if policy in SEARCHING else self.episodes
+    def episodes_of(self, policy: str, cell: SoundnessCell) -> int:
+        """Return how many episodes of a cell a policy drives."""
+        if policy in SEARCHING:
+            return min(self.episodes, self.search_episodes)
+        if policy == FASTEST_SOUND and cell.part == GOAL and self.greedy_episodes is not None:
+            return max(self.greedy_episodes, self.limited)
+        return self.episodes
 
     @property
     def limited(self) -> int:
@@ -110,7 +119,8 @@ def run(plan: Plan, console: Console) -> tuple[dict[str, Any], list[Line]]:
     work, lines = _Work(plan), []
     cells = _with_known_policies(plan.cells(), work.drivers, console)
     total = sum(
-        sum(map(plan.episodes_of, cell.policies)) + 2 * cell.limits * plan.limited for cell in cells
+        sum(plan.episodes_of(name, cell) for name in cell.policies) + 2 * cell.limits * plan.limited
+        for cell in cells
     )
     with progress_on(console) as progress:
         task = progress.add_task("", total=total)
@@ -170,7 +180,8 @@ def _who(cell: SoundnessCell, work: _Work) -> list[tuple[Contestant, int]]:
             (SoundLimit(place, cell.assumptions), limited),
         ]
     return found + [
-        (work.drivers.of(name, cell.assumptions), plan.episodes_of(name)) for name in cell.policies
+        (work.drivers.of(name, cell.assumptions), plan.episodes_of(name, cell))
+        for name in cell.policies
     ]
 
 

@@ -5,8 +5,10 @@ from typing import Any
 
 import pytest
 
+from risk_dqn_planner.errors import ConfigurationError
 from sim_bridge.evaluation import campaign, evaluate
 from sim_bridge.evaluation.soundness.beam import BeamConfig
+from sim_bridge.evaluation.soundness.cells import soundness_cells
 from sim_bridge.evaluation.soundness.evaluate import Plan
 from sim_bridge.evaluation.soundness.reporting.tables import at_a_glance, outcome
 
@@ -99,12 +101,22 @@ def test_a_choice_that_leaves_nothing_is_said(
 
 
 def test_policies_that_search_drive_fewer_episodes_but_all_whose_limits_are_searched() -> None:
+    cell = soundness_cells()[0]
     plan = Plan(Path("out"), episodes=100_000, search_episodes=2000, limit_episodes=300)
-    assert plan.episodes_of("fastest_sound") == 100_000
-    assert plan.episodes_of("look_ahead") == 2000
+    assert plan.episodes_of("fastest_sound", cell) == 100_000
+    assert plan.episodes_of("look_ahead", cell) == 2000
     assert plan.limited == 300
     small = Plan(Path("out"), episodes=50, search_episodes=20, limit_episodes=300)
-    assert (small.episodes_of("look_ahead"), small.limited) == (20, 20)
+    assert (small.episodes_of("look_ahead", cell), small.limited) == (20, 20)
+
+
+def test_the_cheap_policy_can_drive_more_episodes_where_nobody_may_collide() -> None:
+    plan = Plan(Path("out"), episodes=2000, greedy_episodes=100_000)
+    goal, other = soundness_cells()[0], soundness_cells()[-1]
+    assert plan.episodes_of("fastest_sound", goal) == 100_000
+    assert plan.episodes_of("sound_dqn", goal) == plan.episodes_of("fastest_sound", other) == 2000
+    with pytest.raises(ConfigurationError, match="greedy_episodes is 0"):
+        Plan(Path("out"), greedy_episodes=0)
 
 
 def test_a_glance_takes_the_mean_of_the_cells_and_all_collisions() -> None:

@@ -42,8 +42,9 @@ _INTRODUCTION = """\
 
 [safety.md](safety.md) argues why an ego that follows the joint check cannot collide in a world that
 keeps its assumptions. This page looks for the opposite, and says what the promise costs: up to
-{episodes} episodes in each cell, the same ones for every policy, none of them seen in training;
-policies that search at each decision drive the first ones only. Brackets hold 95% intervals.
+{episodes} episodes in each cell, none of them seen in training, and the same ones for every policy,
+but for those that take longer to decide, which drive the first of them only (how many each drove
+stands under *Collisions*). Brackets hold 95% intervals.
 *Centre* and *front* say where the sensor is on the ego; where speeds are perceived with noise the
 check allows for errors of 4 standard deviations.
 

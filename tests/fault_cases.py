@@ -163,7 +163,7 @@ def _of_odometry() -> list[Case]:
     case, field_of = partial(_case, ODOMETRY), partial
     x, v = "pose.pose.position.x", "twist.twist.linear.x"
     jump = Told(Reason.IMPLAUSIBLE_JUMP, ODOMETRY)
-    off = {"passing": (jump,), "recovery_s": RECOVERY_S + 0.5}
+    off = {"passing": (jump,)}
     return [
         case("position NaN", field_of(with_field, path=x, value=_NAN), Reason.NOT_FINITE),
         case("position infinite", field_of(with_field, path=x, value=_INF), Reason.NOT_FINITE),
@@ -177,7 +177,7 @@ def _of_odometry() -> list[Case]:
         case("orientation NaN", field_of(with_field, path="pose.pose.orientation.z", value=_NAN),
              Reason.NOT_FINITE),
         case("says to drive but stands", standing, Reason.FROZEN_INPUT, reaction_s=1.6, frames=25,
-             recovery_s=RECOVERY_S + 0.5, passing=(jump,)),
+             passing=(jump,)),
         case("ego 8 m beside its route", field_of(aside, by_m=8.0), Reason.OFF_ROUTE, **off),
         case("ego faces the wrong way", turned, Reason.WRONG_WAY, **off),
         case("ego elsewhere for one frame", field_of(aside, by_m=1.9), Reason.IMPLAUSIBLE_JUMP,

@@ -18,7 +18,7 @@ from fault_verdict import complaints
 BEGIN, END = "<!-- measured -->", "<!-- end of measured -->"
 LEVELS = {OK: "OK", WARN: "WARN", ERROR: "ERROR", STALE: "STALE"}
 HEADER = (
-    "Repetitions of each fault: {phases}.\n\n"
+    "Repetitions of each fault: {phases}.\n{summary}\n"
     "| input | fault | decision | reason | at fault | diagnostics of the input | "
     "time to react [s] | time to recover [s] |\n|---|---|---|---|---|---|---|---|\n"
 )
@@ -47,9 +47,29 @@ def row(case: Case, reactions: Sequence[Reaction]) -> str:
     return f"| {' | '.join(cells)} |\n"
 
 
-def measure(cases: Sequence[Case], phases: int) -> tuple[list[str], list[str]]:
-    """Return the table's lines, and what was not as it must be."""
-    lines, wrong = [], []
+def slowest(cases: Sequence[Case], measured: Sequence[Sequence[Reaction]]) -> str:
+    """The sentences before the table: the longest times, by how long they may take."""
+    found: dict[str, dict[float, float]] = {"react": {}, "recover": {}}
+    for case, reactions in zip(cases, measured, strict=True):
+        allowed = {"react": case.reaction_s, "recover": case.recovery_s}
+        for reaction in reactions if case.told is not None else ():
+            times = {"react": reaction.react_s, "recover": reaction.recover_s}
+            for kind, time_s in times.items():
+                if time_s is not None:
+                    before_s = found[kind].get(allowed[kind], 0.0)
+                    found[kind][allowed[kind]] = max(before_s, time_s)
+    return "".join(
+        f"Longest time to {kind}: "
+        + "; ".join(f"{took:.1f} s where {limit:.1f} s is allowed" for limit, took in times)
+        + ".\n"
+        for kind, times in ((kind, sorted(by.items())) for kind, by in found.items())
+        if times
+    )
+
+
+def measure(cases: Sequence[Case], phases: int) -> tuple[list[str], str, list[str]]:
+    """Return the table's lines, the sentences before them, and what was not as it must be."""
+    lines, wrong, measured = [], [], []
     with tempfile.TemporaryDirectory() as logs, fault_nodes(Path(logs), SIMULATED) as running:
         driver = FaultDriver(*running)
         driver.meet()
@@ -60,16 +80,19 @@ def measure(cases: Sequence[Case], phases: int) -> tuple[list[str], list[str]]:
             found = [text for reaction in reactions for text in complaints(case, reaction)]
             wrong += [f"{case.title}: {text}" for text in found]
             lines.append(row(case, reactions))
+            measured.append(reactions)
             took_s = time.monotonic() - began_s
             print(f"{lines[-1].strip()} {took_s:.1f} s {found or ''}", flush=True)
-    return lines, wrong
+    return lines, slowest(cases, measured), wrong
 
 
-def written(text: str, lines: Sequence[str], phases: int) -> str:
-    """Put a table between the marks of a document."""
+def written(text: str, summary: str, lines: Sequence[str], phases: int) -> str:
+    """Put what was measured between the marks of a document."""
     head, _, rest = text.partition(BEGIN)
     _, _, tail = rest.partition(END)
-    return f"{head}{BEGIN}\n{HEADER.format(phases=phases)}{''.join(lines)}{END}{tail}"
+    return (
+        f"{head}{BEGIN}\n{HEADER.format(phases=phases, summary=summary)}{''.join(lines)}{END}{tail}"
+    )
 
 
 def main() -> int:
@@ -82,10 +105,11 @@ def main() -> int:
     if options.out is not None and options.only:
         parser.error("a document gets the whole table, so leave out --only or --out")
     chosen = [case for case in CASES if options.only in case.title]
-    lines, wrong = measure(chosen, options.phases)
+    lines, summary, wrong = measure(chosen, options.phases)
+    print(summary)
     if options.out is not None:
         text = options.out.read_text(encoding="utf-8")
-        options.out.write_text(written(text, lines, options.phases), encoding="utf-8")
+        options.out.write_text(written(text, summary, lines, options.phases), encoding="utf-8")
     for text in wrong:
         print(f"error: {text}", file=sys.stderr)
     return 1 if wrong else 0

@@ -29,7 +29,7 @@ from sim_bridge.ros.expectations import (
     write_decisions,
 )
 from sim_bridge.ros.planner_link import DECISION_PERIOD_NS
-from sim_bridge.ros.recording import BagWriter, Stored
+from sim_bridge.ros.recording import ALL_BAGS, BagWriter, Stored
 from sim_bridge.ros.summary import episode_result
 from sim_bridge.ros.topics import DECISION, INPUTS
 
@@ -136,7 +136,7 @@ def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
     )
     parser.add_argument("--seed", type=int, help="of the episode [the bag's own]")
     parser.add_argument(
-        "--folder", type=Path, default=Path("bags"), help="where the bags go [%(default)s]"
+        "--folder", type=Path, default=ALL_BAGS, help="where the bags go [%(default)s]"
     )
     parser.add_argument("--reason", help="why decisions may differ from those expected so far")
     parser.add_argument("--jobs", type=int, default=2, help="bags at a time [%(default)s]")

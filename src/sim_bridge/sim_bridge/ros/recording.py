@@ -39,7 +39,17 @@ from risk_dqn_planner.ros.streams import SECOND_NS
 from sim_bridge.ros.foreign import ForeignObjects, is_foreign
 from sim_bridge.ros.topics import OBJECTS, Topic
 
+ALL_BAGS = Path("bags")
 _INFINITE = QosTime(2147483647, 4294967295)
+
+
+def bag_folder(named: Path, folder: Path = ALL_BAGS) -> Path:
+    """Return a bag that is given by its path, or by its name in the folder of all bags.
+
+    What is neither is returned as it is: who reads it says what is wrong.
+    """
+    beside = folder / named
+    return beside if not named.exists() and beside.exists() else named
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ import yaml
 
 from risk_dqn_planner.errors import ConfigurationError, PlannerError
 from sim_bridge.ros.process import ParameterValue
+from sim_bridge.ros.recording import bag_folder
 from sim_bridge.ros.replayer import replay
 
 
@@ -31,7 +32,7 @@ def parse_override(text: str) -> tuple[str, ParameterValue]:
 
 def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="replay", description=__doc__)
-    parser.add_argument("bag", type=Path, help="folder of the bag, for example bags/four_way")
+    parser.add_argument("bag", type=Path, help="its folder, or its name in bags/: four_way")
     parser.add_argument(
         "--set",
         action="append",
@@ -45,10 +46,11 @@ def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command."""
     arguments = _arguments(argv)
+    bag = bag_folder(arguments.bag)
     try:
         overrides = dict(parse_override(text) for text in arguments.set)
         with tempfile.TemporaryDirectory(prefix="replay_") as folder:
-            result = replay(arguments.bag, overrides, Path(folder))
+            result = replay(bag, overrides, Path(folder))
     except PlannerError as error:
         print(f"replay: {error}", file=sys.stderr)
         return 2
@@ -56,7 +58,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 130
     if result.compared == 0:
         print(
-            f"replay: {arguments.bag} holds no decisions to compare with; "
+            f"replay: {bag} holds no decisions to compare with; "
             "update_bags adds those that are taken now",
             file=sys.stderr,
         )
@@ -64,7 +66,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     for found in result.differences:
         print(found)
     same = result.compared - len(result.differences)
-    print(f"{arguments.bag}: {same} of {result.compared} decisions as recorded")
+    print(f"{bag}: {same} of {result.compared} decisions as recorded")
     return 1 if result.differences else 0
 
 

@@ -18,7 +18,7 @@ from rclpy.serialization import deserialize_message, serialize_message
 from risk_dqn_planner.errors import BagError, PlannerError
 from risk_dqn_planner.ros.streams import SECOND_NS
 from sim_bridge.ros.expectations import changes, lines_of, log_changes, write_decisions
-from sim_bridge.ros.recording import BagWriter, Stored
+from sim_bridge.ros.recording import ALL_BAGS, BagWriter, Stored, bag_folder
 from sim_bridge.ros.replayer import Replayed, replay
 from sim_bridge.ros.topics import DECISION, INPUTS
 
@@ -85,9 +85,9 @@ def update_all(paths: Sequence[Path], reason: str | None) -> bool:
 
 def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="update_bags", description=__doc__)
-    parser.add_argument("bags", type=Path, nargs="*", help="folders of bags [all]")
+    parser.add_argument("bags", type=Path, nargs="*", help="their folders or names [all]")
     parser.add_argument(
-        "--folder", type=Path, default=Path("bags"), help="where all bags are [%(default)s]"
+        "--folder", type=Path, default=ALL_BAGS, help="where all bags are [%(default)s]"
     )
     parser.add_argument("--reason", help="why the decisions may change; without it none does")
     return parser.parse_args(argv)
@@ -100,7 +100,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         if not (given.bags or everything):
             raise BagError(f"{given.folder} holds no bags")
-        accepted = update_all(given.bags or everything, given.reason)
+        chosen = [bag_folder(path, given.folder) for path in given.bags]
+        accepted = update_all(chosen or everything, given.reason)
     except PlannerError as error:
         print(f"update_bags: {error}", file=sys.stderr)
         return 2

@@ -13,6 +13,7 @@ from pathlib import Path
 from rich.console import Console
 
 from risk_dqn_planner.errors import PlannerError
+from sim_bridge.ros.recording import bag_folder
 from sim_bridge.ros.story.chapters import chapters
 from sim_bridge.ros.story.picture import save_picture
 from sim_bridge.ros.story.reading import read
@@ -24,7 +25,7 @@ _PIPE_WIDTH = 400
 
 def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="story", description=__doc__)
-    parser.add_argument("bag", type=Path, help="folder of the bag, for example bags/four_way")
+    parser.add_argument("bag", type=Path, help="its folder, or its name in bags/: four_way")
     parser.add_argument("--topic", help="of the decisions, where the bag has several")
     parser.add_argument("--all", action="store_true", help="every decision, not only changes")
     parser.add_argument(
@@ -39,11 +40,12 @@ def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command."""
     arguments = _arguments(argv)
+    bag = bag_folder(arguments.bag)
     try:
-        recorded = read(arguments.bag, arguments.topic)
+        recorded = read(bag, arguments.topic)
         story = chapters(recorded.events, everything=arguments.all)
         if arguments.picture is not None:
-            save_picture(story, f"{arguments.bag} {recorded.topic}", arguments.picture)
+            save_picture(story, f"{bag} {recorded.topic}", arguments.picture)
     except PlannerError as error:
         print(f"story: {error}", file=sys.stderr)
         return 2
@@ -52,7 +54,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         console.print(part)
     decisions = sum(len(chapter.moments) for chapter in story)
     changes = sum(len(chapter.changes) for chapter in story)
-    console.print(f"{arguments.bag} {recorded.topic}: {decisions} decisions, {changes} told")
+    console.print(f"{bag} {recorded.topic}: {decisions} decisions, {changes} told")
     return 0
 
 

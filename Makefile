@@ -56,8 +56,8 @@ demo: ## drive episodes over DDS [MAP ROUTE ORIGIN PROJECTOR POLICY SCENARIO EPI
 test: ## run all tests, those with real nodes too [ARGS='-k name']
 	@$(WITH_ROS) python -m pytest $(SIDE_BY_SIDE) $(ARGS)
 
-replay: ## feed a bag to the real nodes and compare decisions: BAG=bags/...
-	@$(if $(BAG),,echo 'error: say which bag, for example make replay BAG=bags/four_way' >&2; exit 2)
+replay: ## feed a bag to the real nodes and compare decisions: BAG=four_way or a folder
+	@$(if $(BAG),,echo 'error: say which bag, for example make replay BAG=four_way' >&2; exit 2)
 	@$(WITH_ROS) $(SIMULATION)/replay '$(BAG)' $(ARGS)
 
 bags: ## record the bags anew; UPDATE=1 keeps their inputs; changed decisions need a REASON='...' [BAG]
@@ -73,11 +73,12 @@ convert: ## make a bag of another stack into one to replay: BAG=recorded/bag OUT
 maps: ## draw the project's own maps again
 	@$(WITH_ROS) $(SIMULATION)/draw_maps $(ARGS)
 
-train: ## train a DQN, or go on with it [PRESET REWARD SEED STEPS MAP ROUTE ORIGIN SCENARIO SUPERVISOR MEMORY NAME OUT]
+train: ## train a DQN, or go on with it [PRESET REWARD SEED STEPS MAP ROUTE ORIGIN PROJECTOR SCENARIO SUPERVISOR MEMORY NAME OUT]
 	@$(WITH_ROS) $(SIMULATION)/train $(call option,--preset,PRESET) $(call option,--reward,REWARD) \
 	  $(call option,--seed,SEED) $(call option,--steps,STEPS) $(call option,--map,MAP) \
 	  $(call option,--route,ROUTE) $(call option,--origin,ORIGIN) \
-	  $(call option,--scenario,SCENARIO) $(call option,--supervisor,SUPERVISOR) \
+	  $(call option,--projector,PROJECTOR) $(call option,--scenario,SCENARIO) \
+	  $(call option,--supervisor,SUPERVISOR) \
 	  $(call option,--memory,MEMORY) $(call option,--name,NAME) $(call option,--out,OUT) $(ARGS)
 
 trainings: ## train all policies of the evaluation, one after another [SEEDS='0 1 2']
@@ -87,11 +88,11 @@ trainings: ## train all policies of the evaluation, one after another [SEEDS='0 
 	  $(SIMULATION)/train $(TUNED) --seed $$seed || exit; \
 	  $(SIMULATION)/train $(SOUND_DQN) --seed $$seed || exit; done'
 
-evaluate: ## drive policies through all cells [SET=soundness EPISODES POLICIES SCENARIOS MAP ROUTE ORIGIN REPORT]
+evaluate: ## drive policies through all cells [SET=soundness EPISODES POLICIES SCENARIOS MAP ROUTE ORIGIN PROJECTOR REPORT]
 	@$(WITH_ROS) $(SIMULATION)/evaluate $(call option,--set,SET) $(call option,--episodes,EPISODES) \
 	  $(call option,--policies,POLICIES) $(call option,--scenarios,SCENARIOS) \
 	  $(call option,--map,MAP) $(call option,--route,ROUTE) $(call option,--origin,ORIGIN) \
-	  $(call option,--report,REPORT) $(ARGS)
+	  $(call option,--projector,PROJECTOR) $(call option,--report,REPORT) $(ARGS)
 
 ship: ## ship a trained run, without RUN only write the cards [RUN=out/training/... NAME RESULTS]
 	@$(WITH_ROS) $(SIMULATION)/ship $(call option,--run,RUN) $(call option,--name,NAME) \
@@ -105,8 +106,8 @@ faults: ## measure how the planner reacts to faults, for docs/faults.md [ARGS='-
 	@$(WITH_ROS) python tests/fault_table.py --out docs/faults.md $(ARGS)
 
 .PHONY: story
-story: ## tell when and why decisions changed: BAG=bags/... [TOPIC PICTURE=story.png ARGS=--all]
-	@$(if $(BAG),,echo 'error: say which bag, for example make story BAG=bags/four_way' >&2; exit 2)
+story: ## tell when and why decisions changed: BAG=four_way or a folder [TOPIC PICTURE=story.png ARGS=--all]
+	@$(if $(BAG),,echo 'error: say which bag, for example make story BAG=four_way' >&2; exit 2)
 	@$(WITH_ROS) $(SIMULATION)/story '$(BAG)' $(call option,--topic,TOPIC) \
 	  $(call option,--picture,PICTURE) $(ARGS)
 

@@ -39,6 +39,8 @@ PROJECTORS: dict[str, Projector] = {
     "local_cartesian": LocalCartesianProjector,
     "mercator": MercatorProjector,
 }
+ALL_PROJECTORS = (*PROJECTORS, LOCAL_XY)
+DEFAULT_PROJECTOR = "utm"
 # Farther from its origin, a flat map of a crossing is a mistake, not a choice.
 MAX_ORIGIN_DISTANCE_M = 20_000.0
 
@@ -95,7 +97,7 @@ def lanelet_key(lanelet: Lanelet) -> tuple[int, bool]:
 def load_map(
     path: str | Path,
     origin: MapOrigin | None = None,
-    projector: str = "utm",
+    projector: str = DEFAULT_PROJECTOR,
     location: str = "de",
 ) -> RoadMap:
     """Load a Lanelet2 map (.osm) for vehicles.
@@ -112,8 +114,8 @@ def load_map(
         MapProjectionError: the map lies far from the origin, or has no such coordinates.
         ConfigurationError: unknown projector or location.
     """
-    if projector != LOCAL_XY and projector not in PROJECTORS:
-        valid = ", ".join([*PROJECTORS, LOCAL_XY])
+    if projector not in ALL_PROJECTORS:
+        valid = ", ".join(ALL_PROJECTORS)
         raise ConfigurationError(f"unknown map projector {projector!r}, expected one of {valid}")
     path = Path(path)
     text = read(path)

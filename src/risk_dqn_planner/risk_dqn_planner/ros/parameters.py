@@ -5,7 +5,14 @@ import math
 from dataclasses import dataclass, field
 
 from risk_dqn_planner.errors import ConfigurationError
-from risk_dqn_planner.map.loader import LOCAL_XY, MapOrigin, RoadMap, load_map
+from risk_dqn_planner.map.loader import (
+    ALL_PROJECTORS,
+    DEFAULT_PROJECTOR,
+    LOCAL_XY,
+    MapOrigin,
+    RoadMap,
+    load_map,
+)
 from risk_dqn_planner.policies.shipped import DEFAULT_POLICY, DEFAULT_SUPERVISOR
 from risk_dqn_planner.policies.supervised import supervisor_mode
 from risk_dqn_planner.ros.declaration import Declared
@@ -29,8 +36,8 @@ class MapParameters:
         metadata={"description": "Longitude of the projection's origin [degrees]"},
     )
     map_projector: str = field(
-        default="utm",
-        metadata={"description": "utm, local_cartesian, mercator or local_xy"},
+        default=DEFAULT_PROJECTOR,
+        metadata={"description": ", ".join(ALL_PROJECTORS)},
     )
     map_frame: str = field(
         default="map", metadata={"description": "Frame in which all inputs must be"}

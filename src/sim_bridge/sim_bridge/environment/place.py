@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from risk_dqn_planner.intersection.builder import build_intersection
 from risk_dqn_planner.intersection.config import IntersectionConfig
 from risk_dqn_planner.intersection.model import IntersectionModel
-from risk_dqn_planner.map.loader import MapOrigin, RoadMap, load_map
+from risk_dqn_planner.map.loader import DEFAULT_PROJECTOR, MapOrigin, RoadMap, load_map
 from risk_dqn_planner.situation.config import INSTANTANEOUS, TrackingConfig
 from sim_bridge.maps import chosen_map
 from sim_bridge.scenarios.loading import Scenario
@@ -65,7 +65,7 @@ class Places:
         map_name: str,
         route: tuple[int, ...] | None = None,
         origin: MapOrigin | None = None,
-        projector: str = "utm",
+        projector: str = DEFAULT_PROJECTOR,
     ) -> "Places":
         """Take an own map by its name, or an .osm file.
 
@@ -87,7 +87,7 @@ def load_place(
     map_name: str,
     route: tuple[int, ...] | None = None,
     origin: MapOrigin | None = None,
-    projector: str = "utm",
+    projector: str = DEFAULT_PROJECTOR,
     reach_m: float = USUAL_REACH_M,
 ) -> Place:
     """Load an own map by its name, or an .osm file, which needs a route.

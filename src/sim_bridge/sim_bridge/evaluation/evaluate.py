@@ -18,6 +18,7 @@ from rich.console import Console
 from rich.table import Table
 
 from risk_dqn_planner.errors import ConfigurationError, PlannerError
+from risk_dqn_planner.map.loader import ALL_PROJECTORS, DEFAULT_PROJECTOR
 from risk_dqn_planner.policies.shipped import shipped_policies
 from sim_bridge.environment.place import Places
 from sim_bridge.evaluation.campaign import Campaign, has_optimum, versions
@@ -83,6 +84,11 @@ def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
     add("--route", help="lanelet ids, separated by commas; own maps have one")
     add("--origin", help="latitude,longitude of the map's projection [deg]")
     add(
+        "--projector",
+        default=DEFAULT_PROJECTOR,
+        help=f"of the map: {', '.join(ALL_PROJECTORS)} [%(default)s]",
+    )
+    add(
         "--training",
         type=Path,
         nargs="*",
@@ -98,7 +104,7 @@ def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
 
 def _places(arguments: argparse.Namespace) -> Places:
     route, origin = route_and_origin(arguments.route, arguments.origin)
-    return Places.named(arguments.map or PAPER_MAP, route, origin)
+    return Places.named(arguments.map or PAPER_MAP, route, origin, arguments.projector)
 
 
 def _run(

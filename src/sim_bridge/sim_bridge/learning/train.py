@@ -16,6 +16,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from risk_dqn_planner.errors import PlannerError
+from risk_dqn_planner.map.loader import ALL_PROJECTORS, DEFAULT_PROJECTOR
 from sim_bridge.environment.place import Places
 from sim_bridge.environment.rewards import REWARDS
 from sim_bridge.folders import writing_to
@@ -45,6 +46,11 @@ def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
     )
     add("--route", help="of an .osm file: lanelet ids, separated by commas")
     add("--origin", help="of an .osm file: latitude,longitude of its projection [deg]")
+    add(
+        "--projector",
+        default=DEFAULT_PROJECTOR,
+        help=f"of an .osm file: {', '.join(ALL_PROJECTORS)} [%(default)s]",
+    )
     add("--scenario", default="base", help="names or .yaml files, by commas [%(default)s]")
     add("--supervisor", default="off", help="off or enforce: take sound actions only [%(default)s]")
     add("--memory", default="instantaneous", help="or tracked: of free space seen [%(default)s]")
@@ -133,7 +139,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             supervisor=arguments.supervisor,
             memory=arguments.memory,
         )
-        places = [Places.named(name, route, origin) for name in run.map_names]
+        places = [Places.named(name, route, origin, arguments.projector) for name in run.map_names]
         folder = RunFolder(out, run)
         if folder.finished:
             console.print(f"{out} is trained already; delete it to train again")

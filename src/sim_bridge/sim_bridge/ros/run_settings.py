@@ -7,7 +7,12 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from risk_dqn_planner.errors import BagError, ConfigurationError, PlannerError
-from risk_dqn_planner.map.loader import MapOrigin
+from risk_dqn_planner.map.loader import (
+    ALL_PROJECTORS,
+    DEFAULT_PROJECTOR,
+    LOCAL_XY,
+    MapOrigin,
+)
 from risk_dqn_planner.policies.shipped import DEFAULT_POLICY, DEFAULT_SUPERVISOR
 from risk_dqn_planner.policies.supervised import supervisor_mode
 from risk_dqn_planner.situation.config import SituationConfig, require_memory
@@ -18,7 +23,6 @@ from sim_bridge.ros.topics import remappings
 from sim_bridge.scenarios.loading import load_scenario
 
 DEFAULT_MAP = "four_way"
-DEFAULT_PROJECTOR = "utm"
 DEFAULT_SCENARIO = "base"
 DEFAULT_MEMORY = SituationConfig.memory
 
@@ -128,7 +132,7 @@ def add_run_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--projector",
         default=DEFAULT_PROJECTOR,
-        help="utm, local_cartesian, mercator or local_xy [%(default)s]",
+        help=f"{', '.join(ALL_PROJECTORS)} [%(default)s]",
     )
     parser.add_argument(
         "--policy", default=DEFAULT_POLICY, help="name or policy file [%(default)s]"
@@ -173,13 +177,15 @@ def run_settings(arguments: argparse.Namespace) -> RunSettings:
     named_file = {"allow_unlisted_policy": True} if arguments.policy.endswith(".pt") else {}
     name = str(arguments.map)
     chosen = chosen_map(name, *route_and_origin(arguments.route, arguments.origin))
-    if chosen.origin is None:
+    # Maps in local coordinates are projected from nowhere.
+    origin = MapOrigin(0.0, 0.0) if arguments.projector == LOCAL_XY else chosen.origin
+    if origin is None:
         raise ConfigurationError(f"{name} is no own map, so its origin must be given")
     return RunSettings(
         map_name=name,
         map_file=chosen.path,
         route=chosen.route,
-        origin=chosen.origin,
+        origin=origin,
         projector=arguments.projector,
         policy=arguments.policy,
         scenario=arguments.scenario,

@@ -150,6 +150,7 @@ def test_the_clairvoyant_is_left_out_where_traffic_reacts(
         (["--scenarios", "nothing"], "nothing"),
         (["--map", "nowhere"], "nowhere"),
         (["--route", "1,x"], "1,x"),
+        (["--projector", "globe"], "unknown map projector 'globe'"),
     ],
 )
 def test_a_wrong_option_is_named_and_nothing_is_run(

@@ -182,6 +182,8 @@ def test_command_names_what_it_cannot_use(capsys: pytest.CaptureFixture[str]) ->
     assert "there is no reward 'comfort'" in capsys.readouterr().err
     assert main(["--preset", "fast"]) == 2
     assert "there is no preset 'fast'" in capsys.readouterr().err
+    assert main(["--projector", "globe"]) == 2
+    assert "unknown map projector 'globe'" in capsys.readouterr().err
     assert main(["--seed", "-1"]) == 2
     assert "seed is -1, expected 0 or more" in capsys.readouterr().err
 

@@ -35,6 +35,13 @@ def test_route_and_origin_of_an_own_map_can_be_replaced() -> None:
     assert (settings.origin.latitude_deg, settings.origin.longitude_deg) == (48.5, -9.25)
 
 
+def test_a_map_in_local_coordinates_needs_no_origin() -> None:
+    options = ["--map", "x.osm", "--route", "1,2", "--projector", "local_xy"]
+    settings = parse(*options)
+    assert settings.projector == "local_xy"
+    assert from_notes(settings.map_file, settings.notes(), {}) == settings
+
+
 @pytest.mark.parametrize(
     ("options", "error", "complaint"),
     [

@@ -141,6 +141,67 @@ def test_a_refused_policy_goes_on_saying_stop_until_another_one_is_configured(
     assert {decision.action for decision in decisions} == {Decision.STOP}
 
 
+def test_a_policy_that_is_configured_again_does_not_decide_before_it_is_active(
+    node: Node, manage: Manage
+) -> None:
+    decisions: list[Decision] = []
+    node.create_subscription(Decision, topics.DECISION.name, decisions.append, topics.DECISION.qos)
+    process, life = manage(POLICY, policy="no_such_policy", autostart=True)
+
+    def said() -> set[int]:
+        return {decision.reason for decision in decisions}
+
+    wait_until(lambda: Decision.POLICY_REFUSED in said(), "refusal", PATIENCE_S, process.check)
+    assert life.set("policy", "rule_based") == "ok"
+    assert life.change("configure"), process.output()
+    decisions.clear()
+    wait_until(lambda: len(decisions) >= 3, "decisions", PATIENCE_S, process.check)
+    # Asked, it would say that inputs are missing.
+    assert said() == {Decision.POLICY_NOT_READY}
+    assert "not active" in decisions[-1].text
+    assert life.change("activate")
+    wait_until(lambda: Decision.MISSING_INPUT in said(), "MISSING", PATIENCE_S, process.check)
+
+
+def test_a_policy_node_without_a_manager_is_not_silent_after_a_configuration_that_failed(
+    node: Node, manage: Manage
+) -> None:
+    decisions: list[Decision] = []
+    node.create_subscription(Decision, topics.DECISION.name, decisions.append, topics.DECISION.qos)
+    process, life = manage(POLICY, autostart=True)
+    life.await_state("active")
+    for transition in ("deactivate", "cleanup"):
+        assert life.change(transition)
+    assert life.set("policy", "no_such_policy") == "ok"
+    decisions.clear()
+    assert not life.change("configure")
+    wait_until(lambda: len(decisions) >= 2, "decisions", 5.0, process.check)
+    assert {decision.reason for decision in decisions} == {Decision.POLICY_REFUSED}
+
+
+def test_values_that_contradict_each_other_are_told_of_when_the_node_is_configured(
+    manage: Manage,
+) -> None:
+    process, life = manage(SITUATION)
+    assert life.set("rates.objects.min_rate_hz", 500.0) == "ok"
+    assert not life.change("configure")
+    assert "min_rate_hz is 500.0" in process.output()
+    assert life.set("rates.objects.max_rate_hz", 1000.0) == "ok"
+    assert life.change("configure"), process.output()
+    assert "Traceback" not in process.output()
+
+
+@pytest.mark.parametrize("state", ["unconfigured", "inactive"])
+def test_parameters_cannot_be_deleted(manage: Manage, state: str) -> None:
+    process, life = manage(POLICY)
+    if state == "inactive":
+        assert life.change("configure")
+    for name in ("recovery_s", "policy"):
+        assert life.set(name, None) != "ok"
+    assert "Traceback" not in process.output()
+    assert life.set("recovery_s", 2.0) == "ok"
+
+
 def test_a_policy_file_is_loaded_only_once_its_hash_is_trusted(
     manage: Manage, tmp_path: Path
 ) -> None:

@@ -8,6 +8,7 @@ change at any time or `fixed` where it never may. Nested dataclasses become pref
 
 import dataclasses
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
 from typing import Any, NamedTuple, TypeVar, get_type_hints
 
 from rcl_interfaces.msg import (
@@ -115,7 +116,8 @@ class Declared:
         if resting:
             return SetParametersResult(successful=True)  # `configure` looks at all together
         try:
-            for (config_type, prefix), given in self._configured.items():
+            # A copy: `configure` may be reading in another thread.
+            for (config_type, prefix), given in list(self._configured.items()):
                 _read(self._node, config_type, prefix, given, changes)
         except ConfigurationError as error:
             return SetParametersResult(successful=False, reason=str(error))
@@ -131,7 +133,10 @@ class Declared:
 
     def _after_set(self, parameters: list[Parameter]) -> None:
         if any(self._when.get(parameter.name) is _LIVE for parameter in parameters):
-            self._changed()
+            # Of an unconfigured node they may contradict each other, until it is configured; who
+            # sets them would wait for ever for the answer that an error here cuts off.
+            with suppress(ConfigurationError):
+                self._changed()
 
 
 def _leaves(config_type: type[Any], prefix: str, without: Mapping[str, Any]) -> list[_Leaf]:

@@ -144,17 +144,17 @@ class ManagedNode(LifecycleNodeMixin, Node):
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Answer to the transition `activate`."""
-        self.activate()
+        self._do(self.activate)
         return super().on_activate(state)
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Answer to the transition `deactivate`."""
-        self.deactivate()
+        self._do(self.deactivate)
         return super().on_deactivate(state)
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Answer to the transition `cleanup`."""
-        self.clean_up()
+        self._do(self.clean_up)
         return super().on_cleanup(state)
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -165,7 +165,18 @@ class ManagedNode(LifecycleNodeMixin, Node):
 
     def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Go back to unconfigured after a transition that failed."""
-        self.get_logger().error(f"a transition from {state.label} failed; unconfigured now")
+        text = f"a transition from {state.label} failed; unconfigured now"
+        self.get_logger().error(text)
         self.deactivate()
         self.clean_up()
+        if self.autostart:
+            self.refuse(PlannerError(text))
         return _SUCCESS
+
+    def _do(self, what: Callable[[], None]) -> None:
+        """Do a transition's work; rclpy keeps to itself what goes wrong."""
+        try:
+            what()
+        except Exception:
+            self.get_logger().error(traceback.format_exc())
+            raise

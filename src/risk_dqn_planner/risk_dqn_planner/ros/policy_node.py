@@ -63,7 +63,8 @@ class PolicyNode(ManagedNode):
         self._supervisor: Supervisor | None = None
         self._sound = False
         self._output = DecisionOutput(self, PolicyParameters.marker_frame)
-        self._decider = self._undecided(Reason.POLICY_NOT_READY, "is still being loaded")
+        self._decider = self._undecided("is still being loaded")
+        self._stand_in: Decider | None = None  # decides where the policy must not yet
         self._ticker = Ticker(self, self)
         self._clock_back = on_clock_back(self, lambda: self._decider.clock_went_back(now_ns(self)))
         self.create_subscription(Situation, "~/input/situation", self._on_situation, EACH)
@@ -77,10 +78,11 @@ class PolicyNode(ManagedNode):
         self._ticker.clock_timeout_s = timeout_s
         self._ticker.start(rate_hz, patience_s)
 
-    def _undecided(self, reason: Reason, what: str) -> Decider:
+    def _undecided(self, what: str) -> Decider:
         """Return what says Stop for want of a policy."""
         name = str(self.get_parameter("policy").value)
-        return _stand_in(name, reason, FaultyInput.POLICY, f"policy {name} {what}")
+        text = f"policy {name} {what}"
+        return _stand_in(name, Reason.POLICY_NOT_READY, FaultyInput.POLICY, text)
 
     def configure(self) -> None:
         """Load the policy and let it decide twice, so that the first real decision is not late."""
@@ -94,6 +96,7 @@ class PolicyNode(ManagedNode):
         warm_up(config_of(assumptions), assumptions)
         self._supervisor = policy if isinstance(policy, Supervisor) else None
         self._sound = is_sound(policy)
+        self._stand_in = self._undecided("is loaded, but the node is not active")
         self._decider = Decider(policy, explains, config)
         self.reconfigure()
         text = f"policy {policy.name}"
@@ -105,7 +108,9 @@ class PolicyNode(ManagedNode):
         if isinstance(error, ConfigurationError):
             reason, source = Reason.NOT_CONFIGURED, FaultyInput.PARAMETERS
         text, name = " ".join(str(error).split()), str(self.get_parameter("policy").value)
-        self._decider = _stand_in(name, reason, source, text)
+        self._decider, self._stand_in = _stand_in(name, reason, source, text), None
+        if self.autostart and not self._ticker.running:
+            self._tick()
         self._output.diagnostics.set("policy", ERROR, text, {"reason": reason.name})
 
     def reconfigure(self) -> None:
@@ -127,6 +132,8 @@ class PolicyNode(ManagedNode):
 
     def activate(self) -> None:
         """Begin to decide."""
+        self._decider.forget()  # somebody else may have decided since
+        self._stand_in = None
         self._tick()
         self.get_logger().info(f"ready with policy {self._decider.policy.name}")
 
@@ -136,8 +143,8 @@ class PolicyNode(ManagedNode):
 
     def clean_up(self) -> None:
         """Forget the policy."""
-        self._supervisor = None
-        self._decider = self._undecided(Reason.POLICY_NOT_READY, "is not loaded")
+        self._supervisor = self._stand_in = None
+        self._decider = self._undecided("is not loaded")
         self._output.diagnostics.set("policy", WARN, "unconfigured")
 
     def _on_situation(self, message: Situation) -> None:
@@ -173,7 +180,7 @@ class PolicyNode(ManagedNode):
 
     def _decide(self, stamp_ns: int, trouble: Trouble | None = None) -> None:
         """Take a decision, whatever happens."""
-        decider = self._decider
+        decider = self._stand_in or self._decider
         try:
             choice = decider.decide(stamp_ns, time.monotonic_ns(), trouble)
         except Exception as error:  # noqa: BLE001 (a vehicle stops, whatever fails)

@@ -44,6 +44,11 @@ class Ticker:
         self.clock_timeout_s = 0.5
         self._time_ns = self._since_ns = self._decided_ns = 0  # since, decided: steady clock
 
+    @property
+    def running(self) -> bool:
+        """Whether it asks for decisions."""
+        return bool(self._timers)
+
     def start(self, rate_hz: float, patience_s: float) -> None:
         """Ask `rate_hz` times a second from now on."""
         self.stop()

@@ -16,7 +16,12 @@ from typing import Any
 import pytest
 
 from risk_dqn_planner.ros.lifecycle import LifecycleParameters
-from risk_dqn_planner.ros.parameters import MapParameters, PolicyParameters
+from risk_dqn_planner.ros.parameters import (
+    ClockParameters,
+    MapParameters,
+    PolicyParameters,
+    StandingClockParameters,
+)
 from risk_dqn_planner.situation.config import SituationConfig
 from sim_bridge.ros import topics
 from sim_bridge.ros.simulator_parameters import SimulatorParameters
@@ -150,14 +155,25 @@ def names(*configs: Any) -> set[str]:  # noqa: ANN401
 def test_nodes_get_parameters_that_they_know(monkeypatch: pytest.MonkeyPatch) -> None:
     planner, simulator = run(PLANNER, monkeypatch).nodes, run(SIMULATOR, monkeypatch).nodes
     assert parameters(planner["situation"]) <= names(
-        MapParameters, SituationConfig, LifecycleParameters
+        MapParameters, SituationConfig, LifecycleParameters, ClockParameters
     )
-    assert parameters(planner["policy"]) <= names(PolicyParameters, LifecycleParameters)
+    assert parameters(planner["policy"]) <= names(
+        PolicyParameters, LifecycleParameters, ClockParameters, StandingClockParameters
+    )
     assert parameters(simulator["simulator"]) <= names(SimulatorParameters, MapParameters) | {
         "route"
     }
     for node in ("situation", "policy"):
         assert planner[node].named["executable"] == f"{node}_node"
+
+
+def test_limits_of_simulated_time_are_the_nodes_own_by_default(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    arguments = run(PLANNER, monkeypatch).arguments
+    for config in (ClockParameters(), StandingClockParameters()):
+        for name, value in vars(config).items():
+            assert float(arguments[name].named["default_value"]) == value
 
 
 @pytest.mark.parametrize("name", ["situation", "policy", "simulator"])
@@ -183,6 +199,9 @@ def test_the_demo_is_both_on_one_map_and_one_clock(monkeypatch: pytest.MonkeyPat
     assert set(demo.includes["planner.launch.py"]) <= arguments
     for fixed in ("use_sim_time", "autostart"):
         assert demo.includes["planner.launch.py"][fixed] == "true"
+    # The clock stands while the simulator waits for a late situation, and then for a decision.
+    waits_s = 2.0 * SimulatorParameters.decision_timeout_s
+    assert float(demo.includes["planner.launch.py"]["clock_timeout_s"]) >= waits_s
     assert demo.used <= set(run(SIMULATOR, monkeypatch).arguments)
 
 

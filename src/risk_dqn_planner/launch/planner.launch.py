@@ -32,6 +32,8 @@ def arguments() -> list[DeclareLaunchArgument]:
         ("memory", SituationConfig.memory, "Of hidden space: instantaneous or tracked"),
         ("parameters", str(SHARE / "config" / "planner.yaml"), "File of all other parameters"),
         ("use_sim_time", "false", "Take the time from /clock"),
+        ("clock_timeout_s", "0.5", "A /clock that stands for longer in real time is a fault [s]"),
+        ("sim_time_patience_s", "0.2", "With /clock, inputs of one time may be so far apart [s]"),
         ("autostart", "true", "Configure and activate the nodes; else a lifecycle manager does"),
         ("namespace", "", "Namespace of the nodes"),
         ("log_level", "info", "debug, info, warn, error or fatal"),
@@ -79,7 +81,10 @@ def parameter(name: str, kind: type) -> ParameterValue:
 def generate_launch_description() -> LaunchDescription:
     """Nodes and their arguments."""
     sim_time = {"use_sim_time": parameter("use_sim_time", bool)}
-    common = sim_time | {"autostart": parameter("autostart", bool)}
+    common = sim_time | {
+        "autostart": parameter("autostart", bool),
+        "sim_time_patience_s": parameter("sim_time_patience_s", float),
+    }
     situation_parameters = common | {
         "map_file": parameter("map_file", str),
         "map_origin_latitude": parameter("map_origin_latitude", float),
@@ -94,7 +99,9 @@ def generate_launch_description() -> LaunchDescription:
     )
     policy = node(
         "policy",
-        common | {name: parameter(name, str) for name in ("policy", "supervisor")},
+        common
+        | {name: parameter(name, str) for name in ("policy", "supervisor")}
+        | {"clock_timeout_s": parameter("clock_timeout_s", float)},
         [("input/situation", "situation"), ("output/decision", "decision")],
     )
     rviz = Node(

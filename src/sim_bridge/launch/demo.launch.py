@@ -33,6 +33,9 @@ def generate_launch_description() -> LaunchDescription:
                 "planner",
                 map_file=LaunchConfiguration("map_file"),
                 use_sim_time="true",
+                # In lock-step the clock waits for the planner: twice decision_timeout_s at most.
+                clock_timeout_s="10.0",
+                sim_time_patience_s="1.0",
                 autostart="true",  # the argument of that name is the simulator's
             ),
         ]

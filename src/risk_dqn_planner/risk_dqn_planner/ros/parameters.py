@@ -139,7 +139,8 @@ class PolicyParameters:
     rate_hz: float = field(
         default=2.0,
         metadata={
-            "description": "Decisions a second; learned policies are trained for 2 [Hz]",
+            "description": "Decisions a second; learned policies are trained for 2, and the "
+            "joint check reckons with the period that follows [Hz]",
             "minimum": 0.1,
             "maximum": 20.0,
         },

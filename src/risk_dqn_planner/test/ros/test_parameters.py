@@ -303,9 +303,11 @@ def test_the_parameter_file_holds_all_parameters_with_their_defaults() -> None:
         StandingClockParameters(),
     ) | flat({"safety": safety})  # fmt: skip
     for argument in (
-        "map_file", "map_origin_latitude", "map_origin_longitude", "map_projector", "memory"
+        "map_file", "map_origin_latitude", "map_origin_longitude", "map_projector", "memory",
+        "sim_time_patience_s",
     ):  # fmt: skip
         del situation[argument]  # arguments of the launch file
-    del policy["policy"], policy["supervisor"]  # too
+    for argument in ("policy", "supervisor", "clock_timeout_s", "sim_time_patience_s"):
+        del policy[argument]  # too
     assert found["/**/situation"] == pytest.approx(situation, abs=1e-4)
     assert found["/**/policy"] == pytest.approx(policy)

@@ -124,7 +124,13 @@ def test_a_glance_takes_the_mean_of_the_cells_and_all_collisions() -> None:
     first = {
         "policy": "brave", "episodes": 100, "success": {"rate": 1.0}, "collision": {"rate": 0.0},
         "mean_speed_mps": speed, "switch_share": share, "hard_brake_share": share,
+        "switches_per_episode": {"mean": 2.0},
+        "actions_per_episode": {"stop": {"mean": 5.0}, "fast": {"mean": 15.0}},
     }  # fmt: skip
-    second = {**first, "success": {"rate": 0.5}, "collision": {"rate": 0.03}}
+    second = {
+        **first, "success": {"rate": 0.5}, "collision": {"rate": 0.03},
+        "switches_per_episode": {"mean": 1.0}, "actions_per_episode": {"stop": {"mean": 80.0}},
+    }  # fmt: skip
     row = at_a_glance([first, {**second, "mean_speed_mps": {"mean": 2.0}}]).splitlines()[-1]
-    assert row == "| brave | 2 | 75.0 | 3.00 | 10.0 | 10.0 | 3 |"
+    # 2 + 1 changes in 20 + 80 decisions.
+    assert row == "| brave | 2 | 75.0 | 3.00 | 10.0 | 3.0 | 10.0 | 3 |"

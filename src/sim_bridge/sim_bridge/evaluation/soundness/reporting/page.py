@@ -55,7 +55,8 @@ only. The others are there for contrast.
 _GLANCE = """\
 ## At a glance
 
-Means over all cells with the sensor at the ego's centre, each cell counting as much as any other. A
+Means over all cells with the sensor at the ego's centre, each cell counting as much as any other;
+*of all decisions* counts each decision as much as any other, so that long episodes weigh more. A
 hard brake takes more than 1 m/s off in one decision.
 """
 

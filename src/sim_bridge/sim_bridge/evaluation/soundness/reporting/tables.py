@@ -154,7 +154,10 @@ def smoothness(lines: Sequence[Line]) -> str:
 
 
 def at_a_glance(lines: Sequence[Line]) -> str:
-    """Return how each policy does over all cells together: means of the cells' own means."""
+    """Return how each policy does over all cells together: means of the cells' own means.
+
+    Of the decisions that change also the share of all decisions taken, where long episodes count.
+    """
     keys = {
         "success": 100.0,
         "mean_speed_mps": 1.0,
@@ -169,13 +172,27 @@ def at_a_glance(lines: Sequence[Line]) -> str:
             for key, factor in keys.items()
         ]
         success, mps, changes, brakes = means
-        figures = (f"{success:.1f}", f"{mps:.2f}", f"{changes:.1f}", f"{brakes:.1f}")
+        pooled = 100.0 * _changes_of_all(own)
+        figures = (
+            f"{success:.1f}", f"{mps:.2f}", f"{changes:.1f}", f"{pooled:.1f}", f"{brakes:.1f}",
+        )  # fmt: skip
         rows.append([policy, str(len(own)), *figures, str(sum(map(count, own)))])
     header = [
         "policy", "cells", "success, %", "mean speed, m/s", "decisions that change, %",
-        "hard brakes, %", "collisions",
+        "of all decisions, %", "hard brakes, %", "collisions",
     ]  # fmt: skip
     return table(header, rows)
+
+
+def _changes_of_all(lines: Sequence[Line]) -> float:
+    """Return the share of changes in the decisions of all cells together."""
+    changes = sum(center_of(line["switches_per_episode"]) * line["episodes"] for line in lines)
+    decisions = sum(
+        center_of(mean) * line["episodes"]
+        for line in lines
+        for mean in line["actions_per_episode"].values()
+    )
+    return changes / decisions
 
 
 def collisions_in_all(lines: Sequence[Line]) -> str:

@@ -167,3 +167,20 @@ def test_the_diagnostics_of_an_input_tell_of_its_fault_at_once(planner: PlannerD
         waited_s += time.monotonic() - began_s
     # Entries that came once a second would take longer, three times, but for one case in fifty.
     assert waited_s < 0.5
+
+
+def test_the_diagnostics_of_an_input_tell_at_once_that_its_fault_is_over(
+    planner: PlannerDriver,
+) -> None:
+    name = "situation: odometry"
+    waited_s = 0.0
+    for _ in range(3):
+        planner.decide(replace(FREE, aside_m=30.0))
+        planner.wait_for(lambda: planner.diagnostics[name].level == DiagnosticStatus.ERROR)
+        for _ in range(5):  # it jumps back, and both are told of for a second
+            planner.decide(FREE)
+        began_s = time.monotonic()
+        # A warning is left: these scenes come twice a second only.
+        planner.wait_for(lambda: planner.diagnostics[name].level == DiagnosticStatus.WARN)
+        waited_s += time.monotonic() - began_s
+    assert waited_s < 0.5

@@ -13,10 +13,9 @@ from risk_dqn_planner.ros.clock import now_ns, steady_timer
 from risk_dqn_planner.ros.decider import Choice
 from risk_dqn_planner.ros.diagnostics import ERROR, OK, WARN, Diagnostics, stream_status
 from risk_dqn_planner.ros.qos import NEWEST
-from risk_dqn_planner.ros.streams import RateLimits, Stream
+from risk_dqn_planner.ros.streams import SituationRates, Stream
 
 _DIAGNOSTICS_PERIOD_S = 1.0
-_RATES = RateLimits()
 
 
 class DecisionOutput:
@@ -25,6 +24,7 @@ class DecisionOutput:
     def __init__(self, node: Node, marker_frame: str) -> None:
         self._node = node
         self.marker_frame = marker_frame
+        self.rates = SituationRates()
         self.allowed_age_s = float("inf")  # of situations, by what the supervisor assumes
         self._publisher = node.create_publisher(Decision, "~/output/decision", NEWEST)
         self._marker_publisher = node.create_publisher(MarkerArray, "~/debug/markers", NEWEST)
@@ -41,7 +41,8 @@ class DecisionOutput:
         )
         self._publisher.publish(message)
         self._tell(choice)
-        if choice.decision.faulty_input is FaultyInput.SITUATION:
+        at_fault = choice.decision.faulty_input is FaultyInput.SITUATION
+        if at_fault or not self.diagnostics.is_well("situation"):
             self._tell_of_situations(stream)
         if self._marker_publisher.get_subscription_count() > 0:
             shown = markers.decision_markers(choice.decision, stamp_ns, self.marker_frame)
@@ -79,7 +80,7 @@ class DecisionOutput:
     def _tell_of_situations(self, stream: Stream) -> None:
         """Keep the diagnostics of the situations; a changed level goes out at once."""
         now = now_ns(self._node)
-        level, text, values = stream_status(stream, now, _RATES)
+        level, text, values = stream_status(stream, now, self.rates.situation)
         age_s = stream.age_s(now)
         if level == OK and age_s is not None and age_s > self.allowed_age_s:
             level = WARN

@@ -38,6 +38,11 @@ class Diagnostics:
         if before is None or before.level != level:
             self.publish([status])
 
+    def is_well(self, concern: str) -> bool:
+        """Tell whether nothing is known against a concern."""
+        status = self._statuses.get(concern)
+        return status is None or status.level == OK
+
     def publish(self, statuses: list[DiagnosticStatus] | None = None) -> None:
         """Publish the given statuses, or all."""
         message = DiagnosticArray(status=statuses or list(self._statuses.values()))

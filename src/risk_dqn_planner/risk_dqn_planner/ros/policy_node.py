@@ -41,6 +41,7 @@ from risk_dqn_planner.ros.parameters import (
     read_assumptions,
 )
 from risk_dqn_planner.ros.qos import EACH
+from risk_dqn_planner.ros.streams import RATES, SituationRates
 from risk_dqn_planner.ros.ticker import Ticker
 from risk_dqn_planner.safety.assumptions import SafetyAssumptions
 from risk_dqn_planner.situation.report import SituationReport
@@ -58,6 +59,7 @@ class PolicyNode(ManagedNode):
         super().__init__("policy")
         for config in (PolicyParameters, DeciderConfig, ClockParameters, StandingClockParameters):
             self.declared.add(config)
+        self.declared.add(SituationRates, RATES)
         add_assumptions(self.declared)
         self.declared.guard()
         self._supervisor: Supervisor | None = None
@@ -121,6 +123,7 @@ class PolicyNode(ManagedNode):
         self._decider.reconfigure(replace(config, max_situation_ahead_s=lead_s))
         self._ticker.clock_timeout_s = self.declared.read(StandingClockParameters).clock_timeout_s
         self._output.marker_frame = settings.marker_frame
+        self._output.rates = self.declared.read(SituationRates, RATES)
         mode = supervisor_mode(settings.supervisor)
         supervised = mode is not SupervisorMode.OFF or self._sound
         self._decider.restart_after_fault = supervised

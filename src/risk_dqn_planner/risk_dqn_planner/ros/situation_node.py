@@ -31,20 +31,20 @@ from risk_dqn_planner.ros.parameters import ClockParameters, EgoParameters, MapP
 from risk_dqn_planner.ros.qos import LATCHED, NEWEST
 from risk_dqn_planner.ros.records import RecordReader
 from risk_dqn_planner.ros.situation_output import SituationOutput
-from risk_dqn_planner.ros.streams import SECOND_NS, AgeLimits, InputRates
+from risk_dqn_planner.ros.streams import RATES, SECOND_NS, AgeLimits, InputRates
 from risk_dqn_planner.ros.synchroniser import Frame, Synchroniser, SynchroniserConfig
 from risk_dqn_planner.situation.config import SituationConfig
 from risk_dqn_planner.situation.limits import PlausibilityLimits
 from risk_dqn_planner.situation.pipeline import SituationPipeline
 from risk_dqn_planner.situation.plausibility import Plausibility
-from risk_dqn_planner.situation.report import Fault, SituationReport, fault_of
+from risk_dqn_planner.situation.report import Fault, SituationReport, Status, fault_of
 from risk_dqn_planner.situation.warm_up import example_perception, example_situation
 
 # Faults are repeated at least at 2 Hz, by simulated and by real time.
 WATCH_PERIOD_S = 0.25
 SILENCE_NS = 200_000_000
 DIAGNOSTICS_PERIOD_S = 1.0
-_INTERSECTION, _PLAUSIBILITY, _RATES = "intersection.", "plausibility.", "rates."
+_INTERSECTION, _PLAUSIBILITY = "intersection.", "plausibility."
 _RANGE = "sensor_range_m"  # the intersection's is the situation's
 
 
@@ -64,7 +64,7 @@ class SituationNode(ManagedNode):
             self.declared.add(config)
         self.declared.add(IntersectionConfig, _INTERSECTION, (_RANGE,))
         self.declared.add(PlausibilityLimits, _PLAUSIBILITY)
-        self.declared.add(InputRates, _RATES)
+        self.declared.add(InputRates, RATES)
         self.declared.guard()
         self._working = False
         self._refusal: Fault | None = None
@@ -114,7 +114,7 @@ class SituationNode(ManagedNode):
             config = replace(config, sync_timeout_s=max(config.sync_timeout_s, patience_s))
         self._synchroniser.reconfigure(config, ages)
         self._timeout.timer_period_ns = round(SECOND_NS * config.sync_timeout_s)
-        self._output.rates = self.declared.read(InputRates, _RATES)
+        self._output.rates = self.declared.read(InputRates, RATES)
         limits = self.declared.read(PlausibilityLimits, _PLAUSIBILITY)
         if self._evaluation is not None:
             self._evaluation.plausibility.limits = limits
@@ -204,6 +204,8 @@ class SituationNode(ManagedNode):
 
     def _publish(self, report: SituationReport) -> None:
         self._output.publish(report)
+        if report.status is Status.OK:
+            self._output.tell_of_recovered(self._synchroniser)
         stream = self._synchroniser.streams.get(report.source)
         if stream is not None:
             stream.note(Fault(report.stamp_ns, report.status, report.source, report.text))

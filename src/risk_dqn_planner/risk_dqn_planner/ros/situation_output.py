@@ -77,6 +77,12 @@ class SituationOutput:
             self.tell_of_route(pipeline)
         self._diagnostics.publish()
 
+    def tell_of_recovered(self, synchroniser: Synchroniser) -> None:
+        """Keep the diagnostics of inputs that were not well; a changed level goes out at once."""
+        for source, stream in synchroniser.streams.items():
+            if not self._diagnostics.is_well(str(source)):
+                self.tell_of_input(source, stream)
+
     def tell_of_input(self, source: FaultyInput, stream: Stream) -> None:
         """Keep the diagnostics of an input; a changed level goes out at once."""
         level, text, values = stream_status(stream, now_ns(self._node), self.rates.of(source))

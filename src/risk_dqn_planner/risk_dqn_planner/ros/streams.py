@@ -14,6 +14,7 @@ from risk_dqn_planner.situation.report import Fault, FaultyInput, Status
 from risk_dqn_planner.vehicle import require_positive
 
 SECOND_NS = 1_000_000_000
+RATES = "rates."  # of parameters
 # Rates are told of the newest messages, these many at most and as old at most.
 _RATED_MESSAGES = 100
 _RATED_NS = 2 * SECOND_NS
@@ -101,6 +102,13 @@ class InputRates:
         """Return the rates of one input."""
         limits: RateLimits = getattr(self, source.name.lower())
         return limits
+
+
+@dataclass(frozen=True)
+class SituationRates:
+    """The expected rate of the policy node's input, which is that of the objects."""
+
+    situation: RateLimits = field(default_factory=RateLimits)
 
 
 class Stamped(NamedTuple):

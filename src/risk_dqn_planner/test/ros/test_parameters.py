@@ -28,7 +28,7 @@ from risk_dqn_planner.ros.parameters import (
     add_assumptions,
     read_assumptions,
 )
-from risk_dqn_planner.ros.streams import AgeLimits, InputRates
+from risk_dqn_planner.ros.streams import AgeLimits, InputRates, SituationRates
 from risk_dqn_planner.ros.synchroniser import SynchroniserConfig
 from risk_dqn_planner.safety.assumptions import SafetyAssumptions
 from risk_dqn_planner.situation.config import SituationConfig
@@ -301,7 +301,7 @@ def test_the_parameter_file_holds_all_parameters_with_their_defaults() -> None:
     policy = defaults(
         LifecycleParameters(), PolicyParameters(), DeciderConfig(), ClockParameters(),
         StandingClockParameters(),
-    ) | flat({"safety": safety})  # fmt: skip
+    ) | flat({"safety": safety, "rates": dataclasses.asdict(SituationRates())})  # fmt: skip
     for argument in (
         "map_file", "map_origin_latitude", "map_origin_longitude", "map_projector", "memory",
         "sim_time_patience_s",

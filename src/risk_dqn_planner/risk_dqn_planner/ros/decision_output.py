@@ -33,13 +33,20 @@ class DecisionOutput:
         self._stream: Stream | None = None
         steady_timer(node, _DIAGNOSTICS_PERIOD_S, self._diagnose)
 
-    def publish(self, choice: Choice, stamp_ns: int, stream: Stream) -> None:
-        """Publish a decision taken at a time; `stream`: the situations it is taken on."""
-        self._stream = stream
+    def publish(self, choice: Choice, stamp_ns: int) -> None:
+        """Publish a decision taken at a time.
+
+        Raises:
+            Exception: it cannot be put into a message; nothing was published.
+        """
         message = conversions.decision_to_message(
             choice.decision, stamp_ns, choice.situation_stamp_ns
         )
         self._publisher.publish(message)
+
+    def tell(self, choice: Choice, stamp_ns: int, stream: Stream) -> None:
+        """Tell of a decision everywhere else; `stream`: the situations it is taken on."""
+        self._stream = stream
         self._tell(choice)
         at_fault = choice.decision.faulty_input is FaultyInput.SITUATION
         if at_fault or not self.diagnostics.is_well("situation"):

@@ -4,7 +4,7 @@
 import traceback
 from collections.abc import Callable
 
-from risk_dqn_planner.errors import PlannerError
+from risk_dqn_planner.errors import PlannerError, RouteError
 from risk_dqn_planner.ros import conversions
 from risk_dqn_planner.ros.adapters.kinds import ObjectsAdapter
 from risk_dqn_planner.ros.parameters import EgoParameters, MapParameters
@@ -48,7 +48,12 @@ class Evaluation:
         """Take a route; tell whether it is a new errand, on which the ego may be anywhere."""
         if (route, stamp_ns) == (self.pipeline.route, self.pipeline.route_stamp_ns):
             return False
-        self.pipeline.select(route, stamp_ns)
+        try:
+            self.pipeline.select(route, stamp_ns)
+        except Exception as error:  # noqa: BLE001 (a vehicle stops, whatever a route does)
+            self._complain(traceback.format_exc())
+            text = f"internal error: {' '.join(repr(error).split())}"
+            self.pipeline.route_fault = RouteError(text, kind=Status.INTERNAL_ERROR)
         self.plausibility.forget()
         return True
 

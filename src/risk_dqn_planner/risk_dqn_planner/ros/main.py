@@ -56,7 +56,10 @@ def run_managed(name: str, create: Callable[[], ManagedNode]) -> int:
         try:
             node = create()
             with spinning(node) as executor:
-                node.serve(executor, asked)
+                try:
+                    node.serve(executor, asked)
+                finally:
+                    _ignore_requests()
         except KeyboardInterrupt:
             pass
         except PlannerError as error:
@@ -67,11 +70,18 @@ def run_managed(name: str, create: Callable[[], ManagedNode]) -> int:
             if not asked():
                 raise
         finally:
+            _ignore_requests()
             if node is not None:
                 node.destroy_node()
             try_shutdown()
             sys.stdout.flush()
     return 0
+
+
+def _ignore_requests() -> None:
+    """Ask no more whether to end: the process does, and must not be disturbed."""
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.SIG_IGN)
 
 
 @contextmanager

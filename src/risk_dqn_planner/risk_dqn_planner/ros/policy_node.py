@@ -151,18 +151,13 @@ class PolicyNode(ManagedNode):
         self._output.diagnostics.set("policy", WARN, "unconfigured")
 
     def _on_situation(self, message: Situation) -> None:
-        stamp_ns = conversions.to_ns(message.header.stamp)
         try:
             report = conversions.situation_from_message(message)
         except InputError as error:
-            report = SituationReport(
-                stamp_ns,
-                error.kind,
-                str(error),
-                tuple(message.route),
-                source=error.source,
-                route_stamp_ns=conversions.to_ns(message.route_stamp),
-            )
+            report = _unusable(message, error)
+        except Exception as error:  # noqa: BLE001 (a vehicle stops, whatever an input does)
+            self.get_logger().error(traceback.format_exc(), throttle_duration_sec=10.0)
+            report = _unusable(message, PlannerError(_internal(error)))
         self._decider.receive(report, now_ns(self), time.monotonic_ns())
         self._ticker.situation_came()
 
@@ -186,12 +181,29 @@ class PolicyNode(ManagedNode):
         decider = self._stand_in or self._decider
         try:
             choice = decider.decide(stamp_ns, time.monotonic_ns(), trouble)
+            self._output.publish(choice, stamp_ns)
         except Exception as error:  # noqa: BLE001 (a vehicle stops, whatever fails)
             self.get_logger().error(traceback.format_exc(), throttle_duration_sec=10.0)
             decider.forget()
-            text = f"internal error: {' '.join(repr(error).split())}"
-            choice = Choice(fault_decision(Reason.INTERNAL_ERROR, text), None)
-        self._output.publish(choice, stamp_ns, decider.stream)
+            choice = Choice(fault_decision(Reason.INTERNAL_ERROR, _internal(error)), None)
+            self._output.publish(choice, stamp_ns)
+        self._output.tell(choice, stamp_ns, decider.stream)
+
+
+def _unusable(message: Situation, error: PlannerError) -> SituationReport:
+    return SituationReport(
+        conversions.to_ns(message.header.stamp),
+        error.kind,
+        str(error),
+        tuple(message.route),
+        source=error.source,
+        route_stamp_ns=conversions.to_ns(message.route_stamp),
+    )
+
+
+def _internal(error: Exception) -> str:
+    """Return words for an error of our own, in characters that every message can hold."""
+    return f"internal error: {' '.join(ascii(error).split())}"
 
 
 def _stand_in(name: str, reason: Reason, source: FaultyInput, text: str) -> Decider:

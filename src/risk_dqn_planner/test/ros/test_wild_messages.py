@@ -113,6 +113,22 @@ def evaluation(memory: str, complaints: list[str]) -> Evaluation:
     return made
 
 
+def test_a_route_whose_model_fails_for_a_reason_of_our_own_is_a_fault() -> None:
+    def fail(_: tuple[int, ...]) -> IntersectionModel:
+        raise ZeroDivisionError("of our own")
+
+    complaints: list[str] = []
+    made = Evaluation(
+        MapParameters(), EgoParameters(), ObjectsAdapter(), SituationPipeline(fail),
+        Plausibility(), complaints.append,
+    )  # fmt: skip
+    assert made.begin((10,), 0)
+    report = made.pipeline.route_report(1000 * MS)
+    assert (report.status, report.source) == (Status.INTERNAL_ERROR, FaultyInput.ROUTE)
+    assert "of our own" in report.text
+    assert "Traceback" in complaints[0]
+
+
 def stamped(message: Message, stamp_ns: int) -> Message:
     message.header.stamp = conversions.to_stamp(stamp_ns)
     return message

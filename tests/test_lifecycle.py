@@ -91,6 +91,28 @@ def test_a_node_that_is_asked_to_end_ends_without_an_error_in_every_state(
     assert end(process, number) == 0, process.output()
 
 
+@pytest.mark.parametrize("state", ["unconfigured", "inactive", "active"])
+def test_so_does_the_situation_node(manage: Manage, state: str) -> None:
+    process, life = manage(SITUATION)
+    for transition in {"inactive": ["configure"], "active": ["configure", "activate"]}.get(
+        state, []
+    ):
+        assert life.change(transition)
+    assert life.state() == state
+    assert end(process, signal.SIGTERM) == 0, process.output()
+
+
+@pytest.mark.parametrize("which", [SITUATION, POLICY], ids=["situation", "policy"])
+def test_so_does_a_node_that_says_why_it_could_not_be_configured(
+    manage: Manage, which: int
+) -> None:
+    wrong = {"map_file": "/no/such/map.osm", "policy": "no_such_policy", "autostart": True}
+    process, life = manage(which, **wrong)
+    wait_until(lambda: "not configured" in process.output(), "why", PATIENCE_S, process.check)
+    assert life.state() == "unconfigured"
+    assert end(process, signal.SIGTERM) == 0, process.output()
+
+
 def test_a_managed_policy_decides_while_it_is_active_and_at_no_other_time(
     node: Node, manage: Manage
 ) -> None:

@@ -40,6 +40,7 @@ class Ticker:
         self._decides = decides
         self._timers: list[Timer] = []
         self._patience: Timer | None = None
+        self._pace = (0.0, 0.0)
         self._due_ns: int | None = None  # time of a decision that waits for its situation
         self.clock_timeout_s = 0.5
         self._time_ns = self._since_ns = self._decided_ns = 0  # since, decided: steady clock
@@ -50,8 +51,12 @@ class Ticker:
         return bool(self._timers)
 
     def start(self, rate_hz: float, patience_s: float) -> None:
-        """Ask `rate_hz` times a second from now on."""
+        """Ask `rate_hz` times a second from now on; the next decision is not put off by it."""
+        pace = (rate_hz, patience_s)
+        if self.running and pace == self._pace:
+            return
         self.stop()
+        self._pace = pace
         period_s = 1.0 / rate_hz
         if not is_simulated(self._node):
             self._timers = [steady_timer(self._node, period_s, self._on_tick)]

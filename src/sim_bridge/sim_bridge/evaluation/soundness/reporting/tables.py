@@ -186,9 +186,9 @@ def at_a_glance(lines: Sequence[Line]) -> str:
 
 def _changes_of_all(lines: Sequence[Line]) -> float:
     """Return the share of changes in the decisions of all cells together."""
-    changes = sum(center_of(line["switches_per_episode"]) * line["episodes"] for line in lines)
+    changes = sum(center_of(line["switches_per_episode"]) * int(line["episodes"]) for line in lines)
     decisions = sum(
-        center_of(mean) * line["episodes"]
+        center_of(mean) * int(line["episodes"])
         for line in lines
         for mean in line["actions_per_episode"].values()
     )

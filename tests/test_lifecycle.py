@@ -42,6 +42,14 @@ def manage(
     return start_one
 
 
+@pytest.fixture
+def decisions(node: Node) -> list[Decision]:
+    """All decisions that are heard from now on."""
+    heard: list[Decision] = []
+    node.create_subscription(Decision, topics.DECISION.name, heard.append, topics.DECISION.qos)
+    return heard
+
+
 def end(process: NodeProcess, number: int) -> int:
     os.kill(process.pid, number)
     wait_until(lambda: process.exit_code is not None, "the end", END_S, lambda: None)
@@ -114,10 +122,8 @@ def test_so_does_a_node_that_says_why_it_could_not_be_configured(
 
 
 def test_a_managed_policy_decides_while_it_is_active_and_at_no_other_time(
-    node: Node, manage: Manage
+    decisions: list[Decision], manage: Manage
 ) -> None:
-    decisions: list[Decision] = []
-    node.create_subscription(Decision, topics.DECISION.name, decisions.append, topics.DECISION.qos)
     process, life = manage(POLICY)
     assert life.change("configure")
     assert decisions == []
@@ -145,10 +151,8 @@ def test_what_cannot_be_configured_stays_unconfigured_until_it_is_corrected(
 
 
 def test_a_refused_policy_goes_on_saying_stop_until_another_one_is_configured(
-    node: Node, manage: Manage
+    decisions: list[Decision], manage: Manage
 ) -> None:
-    decisions: list[Decision] = []
-    node.create_subscription(Decision, topics.DECISION.name, decisions.append, topics.DECISION.qos)
     process, life = manage(POLICY, policy="no_such_policy", autostart=True)
 
     def newest() -> int | None:
@@ -164,10 +168,8 @@ def test_a_refused_policy_goes_on_saying_stop_until_another_one_is_configured(
 
 
 def test_a_policy_that_is_configured_again_does_not_decide_before_it_is_active(
-    node: Node, manage: Manage
+    decisions: list[Decision], manage: Manage
 ) -> None:
-    decisions: list[Decision] = []
-    node.create_subscription(Decision, topics.DECISION.name, decisions.append, topics.DECISION.qos)
     process, life = manage(POLICY, policy="no_such_policy", autostart=True)
 
     def said() -> set[int]:
@@ -186,10 +188,8 @@ def test_a_policy_that_is_configured_again_does_not_decide_before_it_is_active(
 
 
 def test_a_policy_node_without_a_manager_is_not_silent_after_a_configuration_that_failed(
-    node: Node, manage: Manage
+    decisions: list[Decision], manage: Manage
 ) -> None:
-    decisions: list[Decision] = []
-    node.create_subscription(Decision, topics.DECISION.name, decisions.append, topics.DECISION.qos)
     process, life = manage(POLICY, autostart=True)
     life.await_state("active")
     for transition in ("deactivate", "cleanup"):

@@ -18,7 +18,6 @@ from rich.console import Console
 from rich.table import Table
 
 from risk_dqn_planner.errors import ConfigurationError, PlannerError
-from risk_dqn_planner.map.loader import ALL_PROJECTORS, DEFAULT_PROJECTOR
 from risk_dqn_planner.policies.shipped import shipped_policies
 from sim_bridge.environment.place import Places
 from sim_bridge.evaluation.campaign import Campaign, has_optimum, versions
@@ -37,7 +36,7 @@ from sim_bridge.evaluation.soundness.evaluate import (
 from sim_bridge.evaluation.store import Store, write_whole
 from sim_bridge.evaluation.training_runs import RUN_FOLDERS, named_runs, training_runs
 from sim_bridge.folders import writing_to
-from sim_bridge.maps import map_names, route_and_origin
+from sim_bridge.maps import add_map_file_options, map_names, route_and_origin
 
 RESULTS = "results.json"
 INTERRUPTED = 130
@@ -81,13 +80,7 @@ def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
         "--map",
         help=f"own map ({maps}) or an .osm file [{PAPER_MAP}; {SOUNDNESS} {','.join(MAPS)}]",
     )
-    add("--route", help="lanelet ids, separated by commas; own maps have one")
-    add("--origin", help="latitude,longitude of the map's projection [deg]")
-    add(
-        "--projector",
-        default=DEFAULT_PROJECTOR,
-        help=f"of the map: {', '.join(ALL_PROJECTORS)} [%(default)s]",
-    )
+    add_map_file_options(parser)
     add(
         "--training",
         type=Path,

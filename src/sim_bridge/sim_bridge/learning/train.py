@@ -16,7 +16,6 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from risk_dqn_planner.errors import PlannerError
-from risk_dqn_planner.map.loader import ALL_PROJECTORS, DEFAULT_PROJECTOR
 from sim_bridge.environment.place import Places
 from sim_bridge.environment.rewards import REWARDS
 from sim_bridge.folders import writing_to
@@ -26,7 +25,7 @@ from sim_bridge.learning.export import initial_weights
 from sim_bridge.learning.presets import PRESETS, preset_named
 from sim_bridge.learning.run import Run
 from sim_bridge.learning.session import Record, Score, Session
-from sim_bridge.maps import map_names, route_and_origin
+from sim_bridge.maps import add_map_file_options, map_names, route_and_origin
 
 INTERRUPTED = 130
 
@@ -44,13 +43,7 @@ def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
         default="four_way",
         help=f"own maps ({maps}) by commas, or an .osm file [%(default)s]",
     )
-    add("--route", help="of an .osm file: lanelet ids, separated by commas")
-    add("--origin", help="of an .osm file: latitude,longitude of its projection [deg]")
-    add(
-        "--projector",
-        default=DEFAULT_PROJECTOR,
-        help=f"of an .osm file: {', '.join(ALL_PROJECTORS)} [%(default)s]",
-    )
+    add_map_file_options(parser)
     add("--scenario", default="base", help="names or .yaml files, by commas [%(default)s]")
     add("--supervisor", default="off", help="off or enforce: take sound actions only [%(default)s]")
     add("--memory", default="instantaneous", help="or tracked: of free space seen [%(default)s]")

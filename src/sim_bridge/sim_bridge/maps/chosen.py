@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """The map and the route that a user has chosen: an own map by its name, or any Lanelet2 file."""
 
+import argparse
 from pathlib import Path
 from typing import NamedTuple
 
 from risk_dqn_planner.errors import ConfigurationError
-from risk_dqn_planner.map.loader import MapOrigin
+from risk_dqn_planner.map.loader import ALL_PROJECTORS, DEFAULT_PROJECTOR, MapOrigin
 from risk_dqn_planner.map.route import parse_route
 from sim_bridge.maps.shipped import shipped_map
 
@@ -33,6 +34,17 @@ def chosen_map(
     if route is None:
         raise ConfigurationError(f"{name} is no own map, so its route must be given")
     return ChosenMap(Path(name), route, origin)
+
+
+def add_map_file_options(parser: argparse.ArgumentParser) -> None:
+    """Declare what a map needs beside its file, for `route_and_origin` and `load_map`."""
+    parser.add_argument("--route", help="lanelet ids, separated by commas; own maps have one")
+    parser.add_argument("--origin", help="latitude,longitude of the map's projection [deg]")
+    parser.add_argument(
+        "--projector",
+        default=DEFAULT_PROJECTOR,
+        help=f"of the map: {', '.join(ALL_PROJECTORS)} [%(default)s]",
+    )
 
 
 def route_and_origin(

@@ -7,16 +7,11 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from risk_dqn_planner.errors import BagError, ConfigurationError, PlannerError
-from risk_dqn_planner.map.loader import (
-    ALL_PROJECTORS,
-    DEFAULT_PROJECTOR,
-    LOCAL_XY,
-    MapOrigin,
-)
+from risk_dqn_planner.map.loader import LOCAL_XY, MapOrigin
 from risk_dqn_planner.policies.shipped import DEFAULT_POLICY, DEFAULT_SUPERVISOR
 from risk_dqn_planner.policies.supervised import supervisor_mode
 from risk_dqn_planner.situation.config import SituationConfig, require_memory
-from sim_bridge.maps import chosen_map, map_names, route_and_origin
+from sim_bridge.maps import add_map_file_options, chosen_map, map_names, route_and_origin
 from sim_bridge.ros.input_loss import InputLoss
 from sim_bridge.ros.process import NodeCommand, ParameterValue
 from sim_bridge.ros.topics import remappings
@@ -127,13 +122,7 @@ def add_run_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--map", default=DEFAULT_MAP, help=f"own map ({names}) or an .osm file [%(default)s]"
     )
-    parser.add_argument("--route", help="lanelet ids, separated by commas; own maps have one")
-    parser.add_argument("--origin", help="latitude,longitude of the map's projection [deg]")
-    parser.add_argument(
-        "--projector",
-        default=DEFAULT_PROJECTOR,
-        help=f"{', '.join(ALL_PROJECTORS)} [%(default)s]",
-    )
+    add_map_file_options(parser)
     parser.add_argument(
         "--policy", default=DEFAULT_POLICY, help="name or policy file [%(default)s]"
     )

@@ -83,7 +83,9 @@ class PolicyFile:
 
 def save_policy(path: Path | str, network: torch.nn.Module, contract: PolicyContract) -> str:
     """Write a policy file and return its SHA-256; the same network gives the same file."""
-    scripted = torch.jit.script(copy.deepcopy(network).eval())
+    # Read back, a module shares no compiled code with others of its class, as in the vehicle:
+    # what torch specialised for one that is being trained fails where nothing is tracked.
+    scripted = _without_origin(torch.jit.script(copy.deepcopy(network).eval()))
     inputs = _golden_inputs(contract.outlook)
     values = _evaluate(scripted, *inputs.values())
     document = {
@@ -98,7 +100,7 @@ def save_policy(path: Path | str, network: torch.nn.Module, contract: PolicyCont
         document["outlook_layout"] = OUTLOOK_LAYOUT
         document["outlook"] = dataclasses.asdict(contract.outlook)
     text = json.dumps(document, indent=1, sort_keys=True)
-    data = _serialise(_without_origin(scripted), {CONTRACT: text})
+    data = _serialise(scripted, {CONTRACT: text})
     Path(path).write_bytes(data)
     return hashlib.sha256(data).hexdigest()
 

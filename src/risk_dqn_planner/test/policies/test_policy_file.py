@@ -67,6 +67,17 @@ def test_a_policy_comes_back_as_it_was_saved(path: Path, tmp_path: Path) -> None
     assert save_policy(tmp_path / "again.pt", make_network(), CONTRACT) == file.sha256
 
 
+def test_a_network_is_saved_where_others_of_its_class_track_gradients(path: Path) -> None:
+    class Trained(RiskDqn):
+        """A class of its own: torch compiles and specialises once for all of a class."""
+
+    scripted = torch.jit.script(Trained())
+    for batch in (1, 7):
+        scripted(torch.rand(batch, 5, 3, 8))
+    sha256 = save_policy(path, Trained(), CONTRACT)
+    assert load_policy_file(path).sha256 == sha256
+
+
 def test_a_policy_file_does_not_name_the_machine_it_was_made_on(path: Path) -> None:
     source = str(Path(__file__).resolve().parents[2]).encode()
     with zipfile.ZipFile(path) as archive:

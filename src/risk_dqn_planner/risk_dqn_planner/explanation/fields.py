@@ -3,7 +3,7 @@
 
 import enum
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from risk_dqn_planner.policies.base import Action
 
@@ -32,8 +32,7 @@ class Critical(enum.IntEnum):
     BEHIND = 4  # in the ego's own lane, behind it
 
 
-@dataclass(frozen=True)
-class Explanation:
+class Explanation(NamedTuple):
     """Whom a decision turns on, when that one comes, and when the ego is gone; NaN: not applicable.
 
     Times count from the situation's stamp and are the worst case: others accelerate up to their

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from risk_dqn_planner.compiled import kernel
 from risk_dqn_planner.explanation.answer import NOBODY, Pair
 from risk_dqn_planner.policies.base import Action
 from risk_dqn_planner.policies.rule_based import RuleBasedConfig
@@ -18,7 +19,7 @@ from risk_dqn_planner.safety.course import BRAKE, GO, begin_course, time_at, wit
 from risk_dqn_planner.safety.joint_check import NO_MANOEUVRE, target_of
 from risk_dqn_planner.safety.merging import leader_margin
 from risk_dqn_planner.safety.others import hidden_arrival, hidden_speed, vehicle_arrival
-from risk_dqn_planner.situation.situations import Situations
+from risk_dqn_planner.situation.situations import Floats, Situations
 
 
 class Yardstick(NamedTuple):
@@ -64,15 +65,24 @@ def leave_time(s: Situations, lane: int, action: Action, by: Yardstick, periods:
 
     Where the manoeuvre ends before that, the ego goes on instead.
     """
-    p = by.numbers
-    ego_mps = max(float(s.ego_speed_mps[0]), 0.0)
-    course = begin_course(ego_mps, target_of(int(by.in_force), p), target_of(int(action), p), p)
-    end_m = s.lane_ego_distance_m[0, lane] + 0.5 * s.lane_ego_zone_m[0, lane]
-    if periods not in (GO, NO_MANOEUVRE):
-        time_s = float(time_at(with_manoeuvre(course, periods, p), end_m, p))
-        if math.isfinite(time_s):
-            return time_s
-    return float(time_at(course, end_m, p))
+    return float(leave_times(s, int(action), int(by.in_force), periods, by.numbers)[lane])
+
+
+@kernel
+def leave_times(
+    s: Situations, action: int, in_force: int, periods: int, p: SafetyNumbers
+) -> Floats:
+    """Return `leave_time` of each lane (M,); all of them at once, since each call costs time."""
+    now_mps = max(s.ego_speed_mps[0], 0.0)
+    going = begin_course(now_mps, target_of(in_force, p), target_of(action, p), p)
+    course = with_manoeuvre(going, GO if periods == NO_MANOEUVRE else periods, p)
+    leave_s = np.empty(s.lane_mask.shape[1])
+    for lane in range(len(leave_s)):
+        end_m = s.lane_ego_distance_m[0, lane] + 0.5 * s.lane_ego_zone_m[0, lane]
+        leave_s[lane] = time_at(course, end_m, p)
+        if not math.isfinite(leave_s[lane]):
+            leave_s[lane] = time_at(going, end_m, p)
+    return leave_s
 
 
 def arrival_time(s: Situations, whom: Pair, by: Yardstick) -> float:
@@ -157,8 +167,7 @@ def nearest(s: Situations, action: Action, by: Yardstick) -> Pair:
     """
     up_mps2 = by.numbers.others_up_mps2
     lanes = [int(k) for k in np.flatnonzero(s.lane_mask[0])]
-    leave_s = np.zeros(s.lane_mask.shape[1])
-    leave_s[lanes] = [leave_time(s, lane, action, by) for lane in lanes]
+    leave_s = leave_times(s, int(action), int(by.in_force), GO, by.numbers)
     zone_m, limit_mps = s.lane_zone_m[0], s.lane_speed_limit_mps[0]
     found: list[tuple[float, int, int, Pair]] = []
     hidden_s = reach_time(s.lane_hidden_distance_m[0], zone_m, limit_mps, up_mps2, limit_mps)

@@ -2,7 +2,6 @@
 """From a policy's answer to its explanation in numbers."""
 
 import math
-from dataclasses import replace
 from typing import NamedTuple
 
 from risk_dqn_planner.explanation.answer import NOBODY, Answer, Pair
@@ -56,7 +55,7 @@ def weigh(
     told = _about(whom, known, answer, s, by)
     if told.critical is Critical.AHEAD and answer.is_told_by_check and answer.lacking_s > 0.0:
         told, whom = _instead_of_leader(known, answer, s, by) or (told, whom)
-    return Weighed(replace(told, verdict=_verdict(told, answer, by)), whom)
+    return Weighed(told._replace(verdict=_verdict(told, answer, by)), whom)
 
 
 def _margins(answer: Answer) -> tuple[float, float, float]:
@@ -87,8 +86,7 @@ def _about(
     lane = whom.lane
     distance_m, speed_mps = distance_and_speed(s, whom, by)
     merging = bool(s.lane_merging[0, lane])
-    known = replace(
-        known,
+    known = known._replace(
         considered=answer.considered,
         hidden=whom.vehicle < 0,
         merging=merging,
@@ -100,18 +98,18 @@ def _about(
     if has_joined(s, whom):
         ahead_m = ahead_of_ego(s, whom)
         critical = Critical.AHEAD if ahead_m > 0.0 else Critical.BEHIND
-        return replace(known, critical=critical, ahead_m=ahead_m)
+        return known._replace(critical=critical, ahead_m=ahead_m)
     periods = GO
     if answer.is_told_by_check and answer.checked is not None:
         periods = answer.checked[answer.considered].periods
     reach_s = arrival_time(s, whom, by)
     leave_s = leave_time(s, lane, answer.considered, by, periods)
     critical = Critical.APPROACHING if reach_s > 0.0 else Critical.IN_ZONE
-    known = replace(known, critical=critical, reach_s=reach_s, leave_s=leave_s)
+    known = known._replace(critical=critical, reach_s=reach_s, leave_s=leave_s)
     if merging and answer.is_told_by_check:
         return known
     gap_s = by.gap_wanted_s
-    return replace(known, gap_wanted_s=gap_s, lacking_s=gap_s - (reach_s - leave_s))
+    return known._replace(gap_wanted_s=gap_s, lacking_s=gap_s - (reach_s - leave_s))
 
 
 def _instead_of_leader(
@@ -133,7 +131,7 @@ def _instead_of_leader(
                 return Weighed(told, first)
     told = _about(leader.whom, known, answer, s, by)
     lacking_s = leader.lacking_s if leader.lacking_s > 0.0 else math.nan
-    return Weighed(replace(told, lacking_s=lacking_s), leader.whom)
+    return Weighed(told._replace(lacking_s=lacking_s), leader.whom)
 
 
 def _room_lacking(whom: Pair, answer: Answer) -> float:

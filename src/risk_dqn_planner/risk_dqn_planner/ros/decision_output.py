@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Where decisions go: topic, RViz, log and diagnostics."""
 
+import os
+
 from intersection_msgs.msg import Decision
 from rclpy.node import Node
 from visualization_msgs.msg import MarkerArray
@@ -43,6 +45,8 @@ class DecisionOutput:
             choice.decision, stamp_ns, choice.situation_stamp_ns
         )
         self._publisher.publish(message)
+        # Linux may have put whoever waits for it behind this very thread: let it run first.
+        os.sched_yield()
 
     def tell(self, choice: Choice, stamp_ns: int, stream: Stream) -> None:
         """Tell of a decision everywhere else; `stream`: the situations it is taken on."""

@@ -54,7 +54,7 @@ def facts(**changed: object) -> Facts:
     usual: dict[str, Any] = {
         "action": Action.STOP,
         "reason": Reason.VEHICLE,
-        "why": Explanation(**(why.__dict__ | changed)),
+        "why": why._replace(**changed),
         "vehicle_id": 17,
         "lane_id": 3,
         "q_values": [math.nan] * 3,

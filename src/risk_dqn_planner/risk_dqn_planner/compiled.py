@@ -2,9 +2,9 @@
 """Typed wrappers of numba: the core's arithmetic is compiled once and kept on disk.
 
 A function is written for scalars or small loops, in plain Python. `kernel` compiles it,
-`elementwise` also lets it broadcast over arrays of any shape. Both can be called from
-other kernels, so batches (training) and a batch of one (vehicle) run the same code.
-`NUMBA_DISABLE_JIT=1` runs kernels as plain Python, for a debugger.
+`allocating_kernel` where it makes arrays, `elementwise` also lets it broadcast over arrays of
+any shape. All can be called from other kernels, so batches (training) and a batch of one
+(vehicle) run the same code. `NUMBA_DISABLE_JIT=1` runs kernels as plain Python, for a debugger.
 """
 
 from collections.abc import Callable, Iterator
@@ -25,9 +25,23 @@ _REORDERING = {"reassoc", "contract", "nsz"}
 
 
 def kernel(function: Function) -> Function:
-    """Compile a function; division by zero follows IEEE 754 as in numpy."""
+    """Compile a function that neither makes arrays nor returns any; IEEE 754 as in numpy.
+
+    It counts no references, and kernels that call it take it in whole: with that, most of the time
+    went into counting the references of every array of every tuple that was passed on. A kernel
+    that makes arrays, copies one into another at once (which may take a third), or calls one that
+    returns them, must be an `allocating_kernel`.
+    """
     with _cache_of(function):
-        return cast(Function, _numba.njit(cache=True, error_model="numpy")(function))
+        compiled = _numba.njit(cache=True, error_model="numpy", forceinline=True, _nrt=False)
+        return cast(Function, compiled(function))
+
+
+def allocating_kernel(function: Function) -> Function:
+    """Compile a function like `kernel`, but one that may make and return arrays."""
+    with _cache_of(function):
+        compiled = _numba.njit(cache=True, error_model="numpy", forceinline=True, _nrt=True)
+        return cast(Function, compiled(function))
 
 
 def reordering_kernel(function: Function) -> Function:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from risk_dqn_planner.compiled import kernel
+from risk_dqn_planner.compiled import allocating_kernel
 from risk_dqn_planner.explanation.answer import NOBODY, Pair
 from risk_dqn_planner.policies.base import Action
 from risk_dqn_planner.policies.rule_based import RuleBasedConfig
@@ -68,7 +68,7 @@ def leave_time(s: Situations, lane: int, action: Action, by: Yardstick, periods:
     return float(leave_times(s, int(action), int(by.in_force), periods, by.numbers)[lane])
 
 
-@kernel
+@allocating_kernel
 def leave_times(
     s: Situations, action: int, in_force: int, periods: int, p: SafetyNumbers
 ) -> Floats:

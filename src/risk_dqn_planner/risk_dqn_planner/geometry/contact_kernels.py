@@ -9,7 +9,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from risk_dqn_planner.compiled import kernel
+from risk_dqn_planner.compiled import allocating_kernel, kernel
 from risk_dqn_planner.geometry.footprint import footprints_separation
 from risk_dqn_planner.geometry.polyline import pose_kernel
 
@@ -25,7 +25,7 @@ NARROWINGS = 40
 GOLDEN = 0.6180339887498949
 
 
-@kernel
+@allocating_kernel
 def poses(xy: Floats, s: Floats, at: Floats) -> Floats:
     """Return the poses (N, 4) at arc lengths `at` (N,) of a polyline."""
     result = np.empty((at.shape[0], 4))
@@ -45,7 +45,7 @@ def separation(first: Floats, shape1: Shape, second: Floats, shape2: Shape) -> f
     )  # fmt: skip
 
 
-@kernel
+@allocating_kernel
 def touches(
     first: Floats, shape1: Shape, second: Floats, shape2: Shape, step: float
 ) -> NDArray[np.bool_]:
@@ -70,7 +70,7 @@ def touches(
     return result
 
 
-@kernel
+@allocating_kernel
 def label(grid: NDArray[np.bool_]) -> tuple[Labels, int]:
     """Number the connected components (8 neighbours) of a grid; 0 stands for none."""
     rows, columns = grid.shape
@@ -133,7 +133,7 @@ def least_separation(
     return (gap, at) if gap < best else (best, where)
 
 
-@kernel
+@allocating_kernel
 def contact_edge(
     xy1: Floats,
     s1: Floats,

@@ -6,7 +6,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from risk_dqn_planner.compiled import kernel
+from risk_dqn_planner.compiled import allocating_kernel, kernel
 
 
 @kernel
@@ -68,7 +68,7 @@ def footprints_overlap(
     return separation < 0.0
 
 
-@kernel
+@allocating_kernel
 def footprint_corners(
     x: float, y: float, heading: float, length: float, width: float
 ) -> NDArray[np.float64]:

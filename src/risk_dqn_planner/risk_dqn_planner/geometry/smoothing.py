@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from risk_dqn_planner.compiled import kernel
+from risk_dqn_planner.compiled import allocating_kernel
 from risk_dqn_planner.geometry.polyline import arc_lengths
 
 Floats = NDArray[np.float64]
@@ -81,7 +81,7 @@ def smooth(points: Floats) -> tuple[Floats, Floats]:
     return np.ascontiguousarray(smoothed[kept]), at[kept]
 
 
-@kernel
+@allocating_kernel
 def _average(points: Floats, half: int) -> Floats:
     """Average each point with up to `half` neighbours on either side; the ends stay."""
     count = points.shape[0]
@@ -96,7 +96,7 @@ def _average(points: Floats, half: int) -> Floats:
     return result
 
 
-@kernel
+@allocating_kernel
 def _corners(points: Floats, tolerance: float) -> NDArray[np.int64]:
     """Return the indices of points that keep all others within `tolerance` of the chords.
 

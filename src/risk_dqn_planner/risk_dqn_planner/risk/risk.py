@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from risk_dqn_planner.compiled import kernel
+from risk_dqn_planner.compiled import allocating_kernel, kernel
 from risk_dqn_planner.risk.config import RiskConfig, RiskParameters
 from risk_dqn_planner.risk.motion import distance_after, speed_after
 from risk_dqn_planner.risk.rewards import leader_gap, leader_reward, safe_leave_reward
@@ -89,7 +89,7 @@ def predict_actions(situations: Situations, config: RiskConfig, horizon_s: float
     return result
 
 
-@kernel
+@allocating_kernel
 def assess_into(
     s: Situations, p: RiskParameters, include_hidden: bool, result: RiskAssessment
 ) -> None:
@@ -108,7 +108,7 @@ def assess_into(
         result.critical_lane[row] = critical.lane
 
 
-@kernel
+@allocating_kernel
 def predict_actions_into(
     s: Situations, p: RiskParameters, horizon_s: float, result: ActionRewards
 ) -> None:

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from risk_dqn_planner.compiled import kernel
+from risk_dqn_planner.compiled import allocating_kernel, kernel
 from risk_dqn_planner.risk.config import RiskParameters
 from risk_dqn_planner.risk.motion import distance_after, speed_after
 from risk_dqn_planner.risk.rewards import leave_time, reach_time, safe_stop_reward
@@ -34,7 +34,7 @@ class Work(NamedTuple):
     ego_distance_m: Floats
 
 
-@kernel
+@allocating_kernel
 def work_memory(vehicles: int, lanes: int) -> Work:
     """Return memory for one situation."""
     return Work(

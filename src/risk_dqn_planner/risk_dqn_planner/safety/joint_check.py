@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from risk_dqn_planner.compiled import kernel
+from risk_dqn_planner.compiled import allocating_kernel, kernel
 from risk_dqn_planner.safety.assumptions import SafetyAssumptions, SafetyNumbers
 from risk_dqn_planner.safety.course import (
     BRAKE,
@@ -98,7 +98,7 @@ def joint_check(
     return result
 
 
-@kernel
+@allocating_kernel
 def check_into(
     s: Situations,
     p: SafetyNumbers,

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from risk_dqn_planner.compiled import kernel
+from risk_dqn_planner.compiled import allocating_kernel, kernel
 from risk_dqn_planner.safety.assumptions import SafetyAssumptions, SafetyNumbers
 from risk_dqn_planner.situation.situations import Booleans, Floats, Integers, Situations
 
@@ -81,7 +81,7 @@ def measured(s: Situations, p: SafetyNumbers) -> Speeds:
     )
 
 
-@kernel
+@allocating_kernel
 def tighten(
     s: Situations,
     restart: Booleans,

@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from risk_dqn_planner.compiled import kernel
+from risk_dqn_planner.compiled import allocating_kernel
 from risk_dqn_planner.geometry.polyline import segment_index_kernel
 from risk_dqn_planner.situation.intervals import insert
 from risk_dqn_planner.situation.occlusion import cuts_kernel, inside_kernel, piece_kernel
@@ -21,7 +21,7 @@ def looked_at(table: PathTable, sensor_range_m: float) -> tuple[Floats, Floats]:
     return exit_m, np.maximum(np.minimum(sensor_range_m, center), exit_m)
 
 
-@kernel
+@allocating_kernel
 def hidden_pieces_kernel(
     table: PathTable,
     p: int,

@@ -6,7 +6,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from risk_dqn_planner.compiled import kernel
+from risk_dqn_planner.compiled import allocating_kernel, kernel
 from risk_dqn_planner.geometry.polyline import project_kernel
 from risk_dqn_planner.situation.inputs import ObjectArrays
 from risk_dqn_planner.situation.paths import PathTable
@@ -55,7 +55,7 @@ def distance_on_path_kernel(
     return NOT_ON_PATH, 0.0
 
 
-@kernel
+@allocating_kernel
 def match_kernel(
     table: PathTable, objects: ObjectArrays, tolerance: float, turn: float
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from risk_dqn_planner.compiled import kernel
+from risk_dqn_planner.compiled import allocating_kernel
 from risk_dqn_planner.situation.config import SituationConfig
 from risk_dqn_planner.situation.hidden_pieces import hidden_pieces_kernel, looked_at
 from risk_dqn_planner.situation.hidden_space import (
@@ -24,7 +24,7 @@ from risk_dqn_planner.situation.paths import PathTable
 from risk_dqn_planner.situation.situations import Floats, Situations
 
 
-@kernel
+@allocating_kernel
 def look_kernel(
     table: PathTable,
     exit_m: Floats,

@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from risk_dqn_planner.compiled import kernel
+from risk_dqn_planner.compiled import allocating_kernel, kernel
 from risk_dqn_planner.geometry.polyline import segment_index_kernel
 from risk_dqn_planner.situation.paths import PathTable
 
@@ -99,7 +99,7 @@ def piece_kernel(
     )
 
 
-@kernel
+@allocating_kernel
 def first_hidden_kernel(xy: Floats, s: Floats, start: float, end: float, polygon: Floats) -> float:
     """Return the first arc length not in the polygon, going upstream from `start` to `end`.
 
@@ -140,7 +140,7 @@ def _first_hidden_piece(
     return 1.0
 
 
-@kernel
+@allocating_kernel
 def hidden_distances_kernel(
     table: PathTable, lanes: int, polygon: Floats, sensor_range: float
 ) -> Floats:

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from risk_dqn_planner.compiled import kernel
+from risk_dqn_planner.compiled import allocating_kernel, kernel
 from risk_dqn_planner.errors import InputError
 from risk_dqn_planner.settled import Settled
 from risk_dqn_planner.situation.situations import Booleans, Floats, Integers, Situations
@@ -135,7 +135,7 @@ def _copy_track(old: Track, new: Track) -> None:
     new.values[:, :, :room] = old.values
 
 
-@kernel
+@allocating_kernel
 def encode_into(
     s: Situations,
     restart: Booleans,

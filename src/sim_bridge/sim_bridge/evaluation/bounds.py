@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from risk_dqn_planner.compiled import kernel
+from risk_dqn_planner.compiled import allocating_kernel, kernel
 from risk_dqn_planner.decision import Action
 from risk_dqn_planner.geometry.footprint import footprints_overlap
 from risk_dqn_planner.situation.situations import Booleans, Floats, Integers
@@ -64,7 +64,7 @@ class Bounds(NamedTuple):
     start_m: float
 
 
-@kernel
+@allocating_kernel
 def speeds_from(drive: EgoDrive, rules: Rules, start_mps: float) -> Speeds:
     """Return all speeds that any actions lead to; the start speed has index 0.
 
@@ -96,13 +96,13 @@ def speeds_from(drive: EgoDrive, rules: Rules, start_mps: float) -> Speeds:
     return Speeds(mps[:count].copy(), after[:count].copy(), way_m[:count].copy())
 
 
-@kernel
+@allocating_kernel
 def no_bounds() -> Bounds:
     """Return bounds that hold nothing."""
     return Bounds(np.empty((0, 1, 1), dtype=np.int16), 0.0)
 
 
-@kernel
+@allocating_kernel
 def blocked_cells(
     ego: EgoLane,
     paths: Paths,
@@ -141,7 +141,7 @@ def blocked_cells(
     return result
 
 
-@kernel
+@allocating_kernel
 def lower_bounds(
     ego: EgoLane,
     paths: Paths,

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from risk_dqn_planner.compiled import kernel
+from risk_dqn_planner.compiled import allocating_kernel, kernel
 from risk_dqn_planner.situation.situations import Floats, Integers
 
 NOTHING = -1
@@ -28,7 +28,7 @@ class Nodes(NamedTuple):
     next: Integers
 
 
-@kernel
+@allocating_kernel
 def room_for(count: int) -> Nodes:
     """Return room for so many states."""
     return Nodes(
@@ -42,7 +42,7 @@ def room_for(count: int) -> Nodes:
     )
 
 
-@kernel
+@allocating_kernel
 def enlarged(nodes: Nodes, used: int) -> Nodes:
     """Return room for twice as many states with the old ones in it."""
     larger = room_for(2 * len(nodes.s_m))
@@ -87,7 +87,7 @@ def find(table: Integers, nodes: Nodes, s_m: float, speed: int, tick: int, merge
     return place
 
 
-@kernel
+@allocating_kernel
 def rehashed(nodes: Nodes, used: int, size: int, merge_m: float) -> Integers:
     """Return a hash table of the states."""
     table = np.full(size, NOTHING, dtype=np.int64)

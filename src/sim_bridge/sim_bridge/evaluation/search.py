@@ -13,7 +13,7 @@ import math
 
 import numpy as np
 
-from risk_dqn_planner.compiled import kernel
+from risk_dqn_planner.compiled import allocating_kernel, kernel
 from risk_dqn_planner.decision import Action
 from risk_dqn_planner.geometry.footprint import footprints_overlap
 from risk_dqn_planner.risk.motion import time_to_cover
@@ -108,7 +108,7 @@ def earliest_tick(
     return earliest
 
 
-@kernel
+@allocating_kernel
 def fastest_way(
     ego: EgoLane,
     paths: Paths,

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from risk_dqn_planner.compiled import kernel
+from risk_dqn_planner.compiled import allocating_kernel, kernel
 from sim_bridge.learning.config import AdviceConfig
 from sim_bridge.learning.dense import Array
 
@@ -34,7 +34,7 @@ def empty_advice(count: int, features: int) -> Advice:
     )
 
 
-@kernel
+@allocating_kernel
 def _copy_rows(source: Advice, rows: NDArray[np.int64], target: Advice) -> None:
     for k in range(rows.shape[0]):
         target.states[k] = source.states[rows[k]]

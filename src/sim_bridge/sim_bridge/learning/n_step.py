@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from risk_dqn_planner.compiled import kernel
+from risk_dqn_planner.compiled import allocating_kernel
 from sim_bridge.learning.replay import Transitions, empty_transitions
 
 
@@ -25,7 +25,7 @@ class _Pending(NamedTuple):
     next: NDArray[np.int64]
 
 
-@kernel
+@allocating_kernel
 def _push(
     pending: _Pending,
     step: Transitions,

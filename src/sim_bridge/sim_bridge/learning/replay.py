@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from risk_dqn_planner.compiled import kernel
+from risk_dqn_planner.compiled import allocating_kernel, kernel
 from risk_dqn_planner.errors import ConfigurationError
 from risk_dqn_planner.policies.base import Action
 from sim_bridge.learning import sum_tree
@@ -69,7 +69,7 @@ def _empty_sample(count: int, features: int) -> Sample:
     )
 
 
-@kernel
+@allocating_kernel
 def _copy_rows(source: Transitions, rows: Integers, target: Transitions) -> None:
     """Copy transition rows[k] of the source to row k of the target."""
     for k in range(rows.shape[0]):

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from risk_dqn_planner.compiled import kernel
+from risk_dqn_planner.compiled import allocating_kernel, kernel
 from risk_dqn_planner.situation.situations import Booleans, Floats, Integers, Situations
 from sim_bridge.perception.visibility import HALF_PLANES, cast_shadows, first_hidden, hide_points
 from sim_bridge.simulation.randomness import NOISE_STREAM, random_normal
@@ -110,7 +110,7 @@ def measured_speed(
     return speed_mps + noise_mps * random_normal(seed, NOISE_STREAM, tick * MOST_IDS + id_)
 
 
-@kernel
+@allocating_kernel
 def see_vehicles(
     table: Floats,
     settings: Settings,

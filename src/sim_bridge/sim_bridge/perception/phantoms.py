@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from risk_dqn_planner.compiled import kernel
+from risk_dqn_planner.compiled import allocating_kernel, kernel
 from risk_dqn_planner.situation.situations import Booleans, Floats, Integers
 from sim_bridge.perception.perception import View
 from sim_bridge.perception.visibility import point_hidden
@@ -56,7 +56,7 @@ def empty_reported(batch: int, vehicles: int, lanes: int) -> Reported:
     )
 
 
-@kernel
+@allocating_kernel
 def report_vehicles(vehicles: Vehicles, view: View, reported: Reported) -> None:
     """Take over the vehicles, which of them are seen and how fast they look."""
     seen, measured_mps = view.seen, view.measured_mps

@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from risk_dqn_planner.compiled import kernel
+from risk_dqn_planner.compiled import allocating_kernel, kernel
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -97,7 +97,7 @@ def cast_shadows(
     return count
 
 
-@kernel
+@allocating_kernel
 def _planes(shadows: Floats, b: int, o: int) -> Planes:
     """Return the four half-planes of shadow (b, o), so that they are read once for many points."""
     return (
@@ -120,7 +120,7 @@ def _sides(planes: Planes, x: float, y: float) -> tuple[float, float, float, flo
     )
 
 
-@kernel
+@allocating_kernel
 def hide_points(
     x: Floats,
     y: Floats,
@@ -148,7 +148,7 @@ def hide_points(
             depth[i] = max(depth[i], within)
 
 
-@kernel
+@allocating_kernel
 def point_hidden(
     x: float,
     y: float,
@@ -187,7 +187,7 @@ def narrowed(enter: float, leave: float, start: float, end: float) -> tuple[floa
     )
 
 
-@kernel
+@allocating_kernel
 def first_in_shadow(
     xy: Floats, p: int, points: int, shadows: Floats, b: int, o: int
 ) -> tuple[int, float]:

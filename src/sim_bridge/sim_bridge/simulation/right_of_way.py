@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from risk_dqn_planner.compiled import kernel
+from risk_dqn_planner.compiled import allocating_kernel, kernel
 from risk_dqn_planner.situation.situations import Booleans, Floats
 from risk_dqn_planner.vehicle import VehicleDimensions
 from sim_bridge.simulation.settings import Idm
@@ -76,7 +76,7 @@ def goes_first(
     return arrival < other_way_m / max(other_mps, _SETTING_OFF_MPS)
 
 
-@kernel
+@allocating_kernel
 def give_way(crossings: Crossings, idm: Idm, episodes: Episodes, vehicles: Vehicles) -> None:
     """Where a decision is due, set before which arc length each vehicle waits for others."""
     running, phase = episodes.running, episodes.phase

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from risk_dqn_planner.compiled import kernel
+from risk_dqn_planner.compiled import allocating_kernel
 from risk_dqn_planner.intersection.model import IntersectionModel
 from risk_dqn_planner.situation.config import SituationConfig
 from risk_dqn_planner.situation.matching import NOT_ON_PATH, distance_on_path_kernel
@@ -52,7 +52,7 @@ class Matches(NamedTuple):
     share_change: Floats
 
 
-@kernel
+@allocating_kernel
 def _lane_along(
     table: PathTable, lanes: int, poses: Floats, tolerance: float, turn: float
 ) -> tuple[Floats, Floats]:

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from risk_dqn_planner.compiled import kernel
+from risk_dqn_planner.compiled import allocating_kernel, kernel
 from risk_dqn_planner.geometry.polyline import Polyline, pose_kernel, project_kernel
 from risk_dqn_planner.situation.situations import Floats
 
@@ -121,7 +121,7 @@ def shared_stretch(p: Polyline, q: Polyline, near_m: float) -> Shared | None:
     return Shared(float(at[begin]), float(at[end]), float(offset), float(at[until]))
 
 
-@kernel
+@allocating_kernel
 def _compared(
     p_xy: Floats, p_s: Floats, q_xy: Floats, q_s: Floats, at: Floats
 ) -> tuple[Floats, Floats, Floats]:

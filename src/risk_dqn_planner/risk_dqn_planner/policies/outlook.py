@@ -197,15 +197,15 @@ def look_into(
             inputs[row, _IN_FORCE + action] = 1.0 if in_force[row] == action else 0.0
             inputs[row, _SOUND + action] = 1.0 if sound[row, action] else 0.0
             inputs[row, _GOING + action] = share_of(going.margin_s, most_s)
-        t = Task(row, p, c, known, corner_m, sound, in_force)
-        place = next_place(s, t, w)
+        t = Task(s, row, p, c, known, corner_m, sound, in_force)
+        place = next_place(t, w)
         tell_place(place, most_m, inputs[row, _PLACE:_LATER])
-        forecast(s, t, place, periods, w, later_s)
+        forecast(t, place, periods, w, later_s)
         for action in range(WAYS_TO_WAIT):
             for k in range(periods):
                 at = _LATER + action * periods + k
                 inputs[row, at] = share_of(later_s[action, k], most_s)
-        tell_hops(s, t, place, w, inputs[row, inputs.shape[1] - _CREEPING :])
+        tell_hops(t, place, w, inputs[row, inputs.shape[1] - _CREEPING :])
 
 
 @kernel
@@ -226,14 +226,14 @@ def tell_place(place: Place, most_m: float, inputs: Inputs) -> None:
 
 
 @kernel
-def tell_hops(s: Situations, t: Task, place: Place, w: Work, inputs: Inputs) -> None:
+def tell_hops(t: Task, place: Place, w: Work, inputs: Inputs) -> None:
     """Fill what the network is told of creeping to the next place (7,).
 
     Ways are told up to FAR_M; where nothing is to be crept to, or the ego would rest beyond it, a
     way is -1 and a shortfall 1.
     """
     inputs[0] = 1.0 if place.creeping else 0.0
-    now_mps = max(s.ego_speed_mps[t.row], 0.0)
+    now_mps = max(t.s.ego_speed_mps[t.row], 0.0)
     for action in range(ACTIONS):
         left_m = place.rest_m - rests_at(0.0, now_mps, target_of(action, t.p), t.p)
         inputs[1 + action], inputs[1 + ACTIONS + action] = -1.0, 1.0

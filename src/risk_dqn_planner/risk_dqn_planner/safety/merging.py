@@ -90,7 +90,6 @@ def merging_margin(
     before_m = start_m - p.zone_margin_m
     bound_m = math.inf if least_m >= 0.0 else before_m
     needed_m = p.between_centres_m + p.clearance_m
-    # Taken out before the loop: reading fields inside costs a count of references each time.
     mask, lanes = s.vehicle_mask, s.vehicle_lane
     distance_m, reacted_m = s.vehicle_distance_m, known.reacted_m[row, lane]
     low_mps, high_mps = known.low_mps, known.high_mps

@@ -70,7 +70,6 @@ def earliest_arrivals(
         arrival_s[lane], who[lane] = math.inf, NOTHING
         if s.lane_mask[row, lane] and not s.lane_merging[row, lane]:
             arrival_s[lane] = hidden_arrival(s, row, lane, p)
-    # Taken out before the loop: reading fields inside costs a count of references each time.
     mask, lanes, ids, merging = s.vehicle_mask, s.vehicle_lane, s.vehicle_id, s.lane_merging
     distance_m, high_mps = s.vehicle_distance_m, known.high_mps
     zone_m, limit_mps = s.lane_zone_m, s.lane_speed_limit_mps

@@ -124,10 +124,6 @@ def still_seen(id_: int, guess: int, mask: Booleans, ids: Integers, b: int) -> b
     return False
 
 
-# Kernels below take the fields of named tuples one by one: reading them inside of a loop costs a
-# count of references each time.
-
-
 @kernel
 def find_lost(
     seen: Integers,

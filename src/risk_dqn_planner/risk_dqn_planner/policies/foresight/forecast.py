@@ -18,7 +18,7 @@ from risk_dqn_planner.risk.motion import distance_after, speed_after
 from risk_dqn_planner.safety.assumptions import SafetyNumbers
 from risk_dqn_planner.safety.course import begin_course
 from risk_dqn_planner.safety.joint_check import ACTIONS, judge, target_of
-from risk_dqn_planner.situation.situations import Floats, Situations
+from risk_dqn_planner.situation.situations import Floats
 
 _ROUNDING = 1e-6
 # By Stop, by Slow, by coming nearer.
@@ -42,31 +42,30 @@ class Place(NamedTuple):
 
 
 @kernel
-def next_place(s: Situations, t: Task, w: Work) -> Place:
+def next_place(t: Task, w: Work) -> Place:
     """Return the nearest place before which the ego can still come to rest."""
-    mps = max(s.ego_speed_mps[t.row], 0.0)
+    mps = max(t.s.ego_speed_mps[t.row], 0.0)
     stops_m = 0.5 * mps * mps / t.p.ego_down_mps2
-    free_m, count = free_way(s, t), find_places(s, t, w.places)
+    free_m, count = free_way(t), find_places(t, w.places)
     rest_m, clear_m, joins = math.inf, math.inf, False
     for j in range(count):
         if stops_m - _ROUNDING <= w.places.rest_m[j] < rest_m:
             rest_m, clear_m = w.places.rest_m[j], w.places.clear_m[j]
             joins = w.places.joins[j]
-    return Place(free_m, rest_m, clear_m, joins, decimetres_matter(s, t, w.places, count))
+    return Place(free_m, rest_m, clear_m, joins, decimetres_matter(t, w.places, count))
 
 
 @kernel
-def forecast(s: Situations, t: Task, place: Place, periods: int, w: Work, margin_s: Floats) -> None:
+def forecast(t: Task, place: Place, periods: int, w: Work, margin_s: Floats) -> None:
     """Fill the margins (3, K) of going after k + 1 periods of each way to wait.
 
     A margin is the one of the joint check [s], in the situation predicted for then.
     """
-    p, now_mps = t.p, max(s.ego_speed_mps[t.row], 0.0)
-    ahead, known = w.ahead, w.known
+    p, now_mps = t.p, max(t.s.ego_speed_mps[t.row], 0.0)
     near_m, near_mps = 0.0, now_mps
     limit_m = place.free_m if place.rest_m == math.inf else place.rest_m
     for k in range(1, periods + 1):
-        predict(s, t, k, w)
+        predict(t, k, w)
         time_s = k * p.period_s
         for wait in range(WAYS_TO_WAIT):
             if wait == _COME_NEARER:
@@ -78,9 +77,9 @@ def forecast(s: Situations, t: Task, place: Place, periods: int, w: Work, margin
                 target_mps = target_of(wait, p)
                 way_m = travelled(now_mps, target_mps, time_s, p)
                 mps = reached(now_mps, target_mps, time_s, p)
-            look_from(s, ahead, t, k, way_m, w)
+            look_from(t, k, way_m, w)
             course = begin_course(mps, target_mps, p.fast_mps, p)
-            verdict = judge(ahead, k, course, w.arrival_s, w.who, known, p)
+            verdict = judge(w.ahead, k, course, w.arrival_s, w.who, w.known, p)
             margin_s[wait, k - 1] = verdict.margin_s
 
 

@@ -61,13 +61,13 @@ def search_into(
 ) -> None:
     """Fill the first action (B,) of the best plans, and who forbids to go at once (B, 2)."""
     for row in range(s.ego_speed_mps.shape[0]):
-        search(s, Task(row, p, c, known, corner_m, sound, in_force), w)
+        search(Task(s, row, p, c, known, corner_m, sound, in_force), w)
         action[row] = w.best.action[0]
         critical[row, 0], critical[row, 1] = w.best.critical[0], w.best.critical[1]
 
 
 @kernel
-def search(s: Situations, t: Task, w: Work) -> None:
+def search(t: Task, w: Work) -> None:
     """Find the best plan of one situation."""
     w.best.total_s[0], w.best.critical[:] = math.inf, NOTHING
     allowed = 0
@@ -75,37 +75,34 @@ def search(s: Situations, t: Task, w: Work) -> None:
         if t.sound[t.row, action]:
             w.best.action[0] = action
             allowed += 1
-    free_m = free_way(s, t)
-    places = find_places(s, t, w.places)
+    free_m = free_way(t)
+    places = find_places(t, w.places)
     if allowed == 1:
         return
-    if w.best.action[0] == _FAST and nothing_to_decide(
-        s, t, free_m, w.places, places, w.shortfall_m
-    ):
+    if w.best.action[0] == _FAST and nothing_to_decide(t, free_m, w.places, places, w.shortfall_m):
         return
-    fine = t.c.fine if decimetres_matter(s, t, w.places, places) else 1
+    fine = t.c.fine if decimetres_matter(t, w.places, places) else 1
     w.cells.stamp[:] = NOTHING
     nodes = w.nodes
     nodes.way_m[0, 0], nodes.cost_s[0, 0] = 0.0, 0.0
-    nodes.speed_mps[0, 0] = max(s.ego_speed_mps[t.row], 0.0)
+    nodes.speed_mps[0, 0] = max(t.s.ego_speed_mps[t.row], 0.0)
     nodes.last[0, 0] = t.in_force[t.row]
     count = 1
     for k in range(t.c.decisions):
-        last_m, merging = predict(s, t, k, w)
-        count = follow(s, t, k, count, free_m, last_m, merging, fine, places, w)
+        last_m, merging = predict(t, k, w)
+        count = follow(t, k, count, free_m, last_m, merging, fine, places, w)
     side = t.c.decisions % 2
     for i in range(count):
         way_m, mps = nodes.way_m[side, i], nodes.speed_mps[side, i]
         total_s = nodes.cost_s[side, i] + t.c.decisions * t.p.period_s
-        total_s += rest_of_time(s.goal_distance_m[t.row] - way_m, mps, t.p)
+        total_s += rest_of_time(t.s.goal_distance_m[t.row] - way_m, mps, t.p)
         if total_s < w.best.total_s[0]:
-            total_s += waiting_price(s, t, way_m, mps, w.places, places, w.shortfall_m)
+            total_s += waiting_price(t, way_m, mps, w.places, places, w.shortfall_m)
             offer(total_s, nodes.first[side, i], w.best)
 
 
 @kernel
 def follow(
-    s: Situations,
     t: Task,
     k: int,
     count: int,
@@ -120,15 +117,14 @@ def follow(
 
     fine: by how much cells are finer than usual; places: how many there are to wait at.
     """
-    p, side, more, goal_m = t.p, k % 2, 0, s.goal_distance_m[t.row]
-    ahead, known = w.ahead, w.known
+    p, side, more, goal_m = t.p, k % 2, 0, t.s.goal_distance_m[t.row]
     for i in range(count):
         way_m, mps = w.nodes.way_m[side, i], w.nodes.speed_mps[side, i]
         last, before_s = w.nodes.last[side, i], w.nodes.cost_s[side, i]
         least_s = k * p.period_s + rest_of_time(goal_m - way_m, mps, p)
         if before_s + least_s >= w.best.total_s[0]:
             continue
-        look_from(s, ahead, t, k, way_m, w)
+        look_from(t, k, way_m, w)
         # The faster action comes first, so that it is taken of two that are as good.
         for slower in range(ACTIONS):
             action = _FAST - slower
@@ -138,7 +134,7 @@ def follow(
             cost_s = before_s + (t.c.switching_s if action != last else 0.0)
             first = action if k == 0 else w.nodes.first[side, i]
             if action == _FAST:
-                going = judge(ahead, k, course, w.arrival_s, w.who, known, p)
+                going = judge(w.ahead, k, course, w.arrival_s, w.who, w.known, p)
                 if going.margin_s >= -_ROUNDING:
                     offer(cost_s + least_s, first, w.best)
                     break
@@ -146,7 +142,7 @@ def follow(
             stops_m = course.m2 + 0.5 * course.v2 * course.v2 / p.ego_down_mps2
             if k > 0 and stops_m > free_m - way_m:
                 periods, _ = vindicate(
-                    ahead, k, course, w.arrival_s, w.who, known, last_m - way_m, merging, p
+                    w.ahead, k, course, w.arrival_s, w.who, w.known, last_m - way_m, merging, p
                 )
                 if periods == NO_MANOEUVRE:
                     continue

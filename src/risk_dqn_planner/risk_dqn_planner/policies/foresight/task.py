@@ -33,14 +33,13 @@ class SearchNumbers(NamedTuple):
 
 
 class Task(NamedTuple):
-    """What to do about a row of B situations `s`; all ways are the ego's from now on.
+    """A row of B situations to be searched; all ways are the ego's from now on.
 
-    row, p, known: as in the joint check. c: of the search. corner_m (B, M): as in sight.py.
+    s, row, p, known: as in the joint check. c: of the search. corner_m (B, M): as in sight.py.
     sound (B, 3): the actions to choose from. in_force (B,): the action before.
-    The situations go beside it, and not in it: taking that many arrays out of a tuple costs a
-    count of references of each of them, in every function that does so.
     """
 
+    s: Situations
     row: int
     p: SafetyNumbers
     c: SearchNumbers

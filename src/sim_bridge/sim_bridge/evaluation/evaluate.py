@@ -59,9 +59,9 @@ def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
         help=f"of them, those that look_ahead drives ({SOUNDNESS}) [%(default)s]",
     )
     add(
-        "--greedy-episodes",
+        "--sound-episodes",
         type=int,
-        help=f"that fastest_sound drives where nobody may collide ({SOUNDNESS}) [as --episodes]",
+        help=f"that sound policies drive where they may not collide ({SOUNDNESS}) [as --episodes]",
     )
     add(
         "--limit-episodes",
@@ -205,7 +205,7 @@ def _soundness(arguments: argparse.Namespace, console: Console) -> None:
         episodes,
         arguments.search_episodes,
         arguments.limit_episodes,
-        arguments.greedy_episodes,
+        arguments.sound_episodes,
         **chosen,
     )
     # Matplotlib takes a second to load, too long for --help.

@@ -15,7 +15,6 @@ from sim_bridge.evaluation.campaign import Campaign, versions
 from sim_bridge.evaluation.progress import progress_on
 from sim_bridge.evaluation.rollout import Clairvoyant, Contestant
 from sim_bridge.evaluation.soundness.cells import (
-    FASTEST_SOUND,
     GOAL,
     SEARCHING,
     SoundnessCell,
@@ -38,8 +37,8 @@ class Plan:
     """How much of the set is driven.
 
     search_episodes: the first ones, for policies that search at each decision; limit_episodes:
-    the first ones of those, for the limits. greedy_episodes: for fastest_sound, which is cheap, in
-    the cells where nobody sound may collide; None for as many as the others.
+    the first ones of those, for the limits. sound_episodes: for all others that take sound actions
+    only, in the cells where these may not collide; None for as many as elsewhere.
 
     maps, scenarios, policies: only these; empty for all. output: folder of finished cells.
     """
@@ -48,13 +47,13 @@ class Plan:
     episodes: int = EPISODES
     search_episodes: int = SEARCH_EPISODES
     limit_episodes: int = LIMIT_EPISODES
-    greedy_episodes: int | None = None
+    sound_episodes: int | None = None
     maps: tuple[str, ...] = ()
     scenarios: tuple[str, ...] = ()
     policies: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        for name in ("episodes", "search_episodes", "limit_episodes", "greedy_episodes"):
+        for name in ("episodes", "search_episodes", "limit_episodes", "sound_episodes"):
             count = getattr(self, name)
             if count is not None and count < 1:
                 raise ConfigurationError(f"{name} is {count}, expected 1 or more")
@@ -79,8 +78,8 @@ class Plan:
         """Return how many episodes of a cell a policy drives."""
         if policy in SEARCHING:
             return min(self.episodes, self.search_episodes)
-        if policy == FASTEST_SOUND and cell.part == GOAL and self.greedy_episodes is not None:
-            return max(self.greedy_episodes, self.limited)
+        if is_sound(policy) and cell.part == GOAL and self.sound_episodes is not None:
+            return max(self.sound_episodes, self.limited)
         return self.episodes
 
     @property

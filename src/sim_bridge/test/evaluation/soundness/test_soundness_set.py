@@ -110,13 +110,16 @@ def test_policies_that_search_drive_fewer_episodes_but_all_whose_limits_are_sear
     assert (small.episodes_of("look_ahead", cell), small.limited) == (20, 20)
 
 
-def test_the_cheap_policy_can_drive_more_episodes_where_nobody_may_collide() -> None:
-    plan = Plan(Path("out"), episodes=2000, greedy_episodes=100_000)
+def test_who_may_not_collide_can_be_asked_for_more_episodes() -> None:
+    plan = Plan(Path("out"), episodes=2000, sound_episodes=100_000, search_episodes=300)
     goal, other = soundness_cells()[0], soundness_cells()[-1]
-    assert plan.episodes_of("fastest_sound", goal) == 100_000
-    assert plan.episodes_of("sound_dqn", goal) == plan.episodes_of("fastest_sound", other) == 2000
-    with pytest.raises(ConfigurationError, match="greedy_episodes is 0"):
-        Plan(Path("out"), greedy_episodes=0)
+    for policy in ("fastest_sound", "sound_dqn", "tuned+supervisor"):
+        assert plan.episodes_of(policy, goal) == 100_000
+        assert plan.episodes_of(policy, other) == 2000
+    assert plan.episodes_of("tuned", goal) == 2000
+    assert plan.episodes_of("look_ahead", goal) == 300
+    with pytest.raises(ConfigurationError, match="sound_episodes is 0"):
+        Plan(Path("out"), sound_episodes=0)
 
 
 def test_a_glance_takes_the_mean_of_the_cells_and_all_collisions() -> None:

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Between messages and the core's types: only here, and in explanations.py, are fields touched.
+"""Between messages and the core's types.
+
+Fields are touched here, in situation_records.py, which reads long messages, and in explanations.py.
 
 Nothing is trusted: what comes in is checked for finite numbers here or, where the core looks at
 it anyway (ego, objects, visible area), there. A violation raises InputError.
@@ -30,6 +32,7 @@ from risk_dqn_planner.faults import FaultyInput, Status
 from risk_dqn_planner.policies.base import Supervision
 from risk_dqn_planner.ros.explanations import explanation_from_message, explanation_to_message
 from risk_dqn_planner.ros.records import RecordList, RecordReader
+from risk_dqn_planner.ros.situation_records import SituationRecords
 from risk_dqn_planner.ros.streams import SECOND_NS
 from risk_dqn_planner.situation.inputs import EgoPose, ObjectArrays, Perception
 from risk_dqn_planner.situation.report import SituationReport
@@ -38,6 +41,8 @@ from risk_dqn_planner.situation.situations import Floats, Situations, empty_situ
 _FIRST_NS, _LAST_NS = -(2**31) * SECOND_NS, 2**31 * SECOND_NS - 1
 # Orientations of drivers and simulators are normalised; an unset one has norm 0.
 _QUATERNION_NORM_TOLERANCE = 0.1
+# Situations have places for a multiple of so many.
+_VEHICLES_AT_ONCE = 16
 
 read_area = RecordReader(Point32)
 read_objects = RecordReader(PerceivedObject)
@@ -242,7 +247,7 @@ def _fill_situation(message: SituationMessage, given: Situations) -> None:
     ]
 
 
-def situation_from_message(message: SituationMessage) -> SituationReport:
+def situation_from_records(message: SituationRecords) -> SituationReport:
     """Return what the situation node reports.
 
     Raises:
@@ -258,43 +263,46 @@ def situation_from_message(message: SituationMessage) -> SituationReport:
         status=status,
         source=source,
         text=message.status_text,
-        route=tuple(int(lanelet_id) for lanelet_id in message.route),
+        route=tuple(message.route.tolist()),
         route_stamp_ns=to_ns(message.route_stamp),
         stop_line_derived=message.stop_line_derived,
         situations=_read_situation(message) if status is Status.OK else None,
     )
 
 
-def _read_situation(message: SituationMessage) -> Situations:
+def _read_situation(message: SituationRecords) -> Situations:
     lanes, vehicles = message.lanes, message.vehicles
-    index = {lane.lane_id: k for k, lane in enumerate(lanes)}
+    index = {lane_id: k for k, lane_id in enumerate(lanes["lane_id"].tolist())}
     if len(index) < len(lanes):
         raise _bad_situation("a lane appears twice")
-    for vehicle in vehicles:
-        if vehicle.lane_id not in index:
-            raise _bad_situation(
-                f"vehicle {vehicle.vehicle_id} is on lane {vehicle.lane_id}, "
-                f"expected one of {sorted(index)}"
-            )
+    on_lanes = [index.get(lane_id, -1) for lane_id in vehicles["lane_id"].tolist()]
+    if -1 in on_lanes:
+        vehicle = vehicles[on_lanes.index(-1)]
+        raise _bad_situation(
+            f"vehicle {vehicle['vehicle_id']} is on lane {vehicle['lane_id']}, "
+            f"expected one of {sorted(index)}"
+        )
     n, m = len(vehicles), len(lanes)
-    # At least one place of each, so that nobody has to think of arrays without entries.
-    filled = empty_situations(1, max(n, 1), max(m, 1))
+    # Nobody has to think of arrays without entries; and their number seldom changes, so that what
+    # a policy has made ready for it fits the next time too.
+    places = _VEHICLES_AT_ONCE * max(math.ceil(n / _VEHICLES_AT_ONCE), 1)
+    filled = empty_situations(1, places, max(m, 1))
     filled.stop_line_distance_m[0] = message.stop_line_distance_m
     filled.goal_distance_m[0] = message.goal_distance_m
     filled.ego_speed_mps[0] = message.ego_speed_mps
     filled.lane_mask[0, :m] = True
-    filled.lane_id[0, :m] = [lane.lane_id for lane in lanes]
-    filled.lane_merging[0, :m] = [lane.kind == IntersectingLane.MERGING for lane in lanes]
-    filled.lane_ego_distance_m[0, :m] = [lane.ego_distance_m for lane in lanes]
-    filled.lane_ego_zone_m[0, :m] = [lane.ego_zone_m for lane in lanes]
-    filled.lane_zone_m[0, :m] = [lane.zone_m for lane in lanes]
-    filled.lane_hidden_distance_m[0, :m] = [lane.hidden_distance_m for lane in lanes]
-    filled.lane_speed_limit_mps[0, :m] = [lane.speed_limit_mps for lane in lanes]
+    filled.lane_id[0, :m] = lanes["lane_id"]
+    filled.lane_merging[0, :m] = lanes["kind"] == IntersectingLane.MERGING
+    filled.lane_ego_distance_m[0, :m] = lanes["ego_distance_m"]
+    filled.lane_ego_zone_m[0, :m] = lanes["ego_zone_m"]
+    filled.lane_zone_m[0, :m] = lanes["zone_m"]
+    filled.lane_hidden_distance_m[0, :m] = lanes["hidden_distance_m"]
+    filled.lane_speed_limit_mps[0, :m] = lanes["speed_limit_mps"]
     filled.vehicle_mask[0, :n] = True
-    filled.vehicle_id[0, :n] = [vehicle.vehicle_id for vehicle in vehicles]
-    filled.vehicle_lane[0, :n] = [index[vehicle.lane_id] for vehicle in vehicles]
-    filled.vehicle_distance_m[0, :n] = [vehicle.distance_m for vehicle in vehicles]
-    filled.vehicle_speed_mps[0, :n] = [vehicle.speed_mps for vehicle in vehicles]
+    filled.vehicle_id[0, :n] = vehicles["vehicle_id"]
+    filled.vehicle_lane[0, :n] = on_lanes
+    filled.vehicle_distance_m[0, :n] = vehicles["distance_m"]
+    filled.vehicle_speed_mps[0, :n] = vehicles["speed_mps"]
     # All fields at once: one after the other they take longer than everything else here.
     if not np.isfinite(np.concatenate(filled, axis=None)).all():
         named = zip(filled._fields, filled, strict=True)

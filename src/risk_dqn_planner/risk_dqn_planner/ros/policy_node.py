@@ -41,6 +41,7 @@ from risk_dqn_planner.ros.parameters import (
     read_assumptions,
 )
 from risk_dqn_planner.ros.qos import EACH
+from risk_dqn_planner.ros.situation_records import SituationRecords, read_situation
 from risk_dqn_planner.ros.streams import RATES, SituationRates
 from risk_dqn_planner.ros.ticker import Ticker
 from risk_dqn_planner.safety.assumptions import SafetyAssumptions
@@ -69,7 +70,7 @@ class PolicyNode(ManagedNode):
         self._stand_in: Decider | None = None  # decides where the policy must not yet
         self._ticker = Ticker(self, self)
         self._clock_back = on_clock_back(self, lambda: self._decider.clock_went_back(now_ns(self)))
-        self.create_subscription(Situation, "~/input/situation", self._on_situation, EACH)
+        self.create_subscription(Situation, "~/input/situation", self._on_situation, EACH, raw=True)
         if self.autostart:
             self._tick()
 
@@ -150,9 +151,16 @@ class PolicyNode(ManagedNode):
         self._decider = self._undecided("is not loaded")
         self._output.diagnostics.set("policy", WARN, "unconfigured")
 
-    def _on_situation(self, message: Situation) -> None:
+    def _on_situation(self, data: bytes) -> None:
         try:
-            report = conversions.situation_from_message(message)
+            message = read_situation(data)
+        except ValueError as error:
+            # It counts as not received, as one that rclpy cannot read does.
+            text = f"a situation cannot be read: {error}"
+            self.get_logger().error(text, throttle_duration_sec=10.0)
+            return
+        try:
+            report = conversions.situation_from_records(message)
         except InputError as error:
             report = _unusable(message, error)
         except Exception as error:  # noqa: BLE001 (a vehicle stops, whatever an input does)
@@ -190,12 +198,12 @@ class PolicyNode(ManagedNode):
         self._output.tell(choice, stamp_ns, decider.stream)
 
 
-def _unusable(message: Situation, error: PlannerError) -> SituationReport:
+def _unusable(message: SituationRecords, error: PlannerError) -> SituationReport:
     return SituationReport(
         conversions.to_ns(message.header.stamp),
         error.kind,
         str(error),
-        tuple(message.route),
+        tuple(message.route.tolist()),
         source=error.source,
         route_stamp_ns=conversions.to_ns(message.route_stamp),
     )

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Long lists of numbers, read from a serialised message at once.
+"""Messages with long lists of numbers, read from their serialised form.
 
-rclpy makes an object of every corner and of every perceived vehicle, which takes longer than all
-that is done with them. A message that consists of a header and one list of records of numbers is
-laid out plainly on the wire (XCDR1, DDS-XTypes 7.4.3), so that numpy reads the list as an array.
+rclpy makes an object of every corner and of every vehicle, which takes longer than all that is
+done with them. On the wire (XCDR1, DDS-XTypes 7.4.3) a list of records of numbers is laid out
+plainly, so that numpy reads it as an array.
 """
 
 import struct
@@ -15,9 +15,101 @@ from numpy.typing import NDArray
 from rclpy.serialization import serialize_message
 from std_msgs.msg import Header
 
-_NUMBERS = {"int64": "i8", "float": "f4", "double": "f8"}
+_NUMBERS = {"uint8": "u1", "int64": "i8", "float": "f4", "double": "f8"}
 _BODY = 4  # bytes before the message, which say how it is encoded
 _ORDERS: dict[bytes, Literal["<", ">"]] = {b"\0\0": ">", b"\0\1": "<"}
+
+
+class Layout:
+    """How the elements of a list lie in memory."""
+
+    def __init__(self, native: np.dtype[Any]) -> None:
+        """Take how they lie in the memory of this computer."""
+        self.alignment = native.alignment
+        self._of_order = {order: native.newbyteorder(order) for order in _ORDERS.values()}
+
+    @classmethod
+    def of_records(cls, record: Any) -> "Layout":  # noqa: ANN401 (the class of a message)
+        """Return the layout of messages all of whose fields are numbers.
+
+        Raises:
+            ValueError: one is not, or they lie elsewhere on the wire than in memory.
+        """
+        fields = record.get_fields_and_field_types()
+        others = sorted(set(fields.values()) - set(_NUMBERS))
+        if others:
+            raise ValueError(f"{record.__name__} has fields of {', '.join(others)}, not numbers")
+        native = np.dtype([(name, _NUMBERS[kind]) for name, kind in fields.items()], align=True)
+        # On the wire a record begins where its first field may, and ends with its last.
+        (*_, name), first, last = fields, native[0], native[len(fields) - 1]
+        end = (native.fields or {})[name][1] + last.itemsize
+        if first.itemsize < native.alignment or end < native.itemsize:
+            raise ValueError(f"{record.__name__} begins or ends with a field that is too small")
+        return cls(native)
+
+    def in_order(self, order: Literal["<", ">"]) -> np.dtype[Any]:
+        """Return how they lie in the memory of a computer of this order of bytes."""
+        return self._of_order[order]
+
+
+class Cursor:
+    """Reads a serialised message, one field after the other."""
+
+    def __init__(self, data: bytes) -> None:
+        """Begin before the first field.
+
+        Raises:
+            ValueError: the message is encoded in another way. So does whatever reads on where it
+                ends too early.
+        """
+        order = _ORDERS.get(data[:2])
+        if order is None:
+            raise ValueError(f"a message is encoded as {data[:2].hex()}, expected 0000 or 0001")
+        self._data, self._order = data, order
+        self._at = _BODY
+
+    def numbers(self, kinds: str) -> tuple[Any, ...]:
+        """Return numbers of the same size, one after the other; `kinds` as in `struct`."""
+        return self._unpack(kinds, struct.calcsize(kinds[0]))
+
+    def time(self) -> Time:
+        """Return a point in time."""
+        seconds, nanoseconds = self.numbers("iI")
+        return Time(sec=seconds, nanosec=nanoseconds)
+
+    def text(self) -> str:
+        """Return a string; what is no UTF-8 is replaced."""
+        (length,) = self.numbers("I")
+        (text,) = self._unpack(f"{length}s", 1)
+        return str(text.rstrip(b"\0").decode(errors="replace"))
+
+    def header(self) -> Header:
+        """Return a header."""
+        return Header(stamp=self.time(), frame_id=self.text())
+
+    def array(self, layout: Layout) -> NDArray[Any]:
+        """Return a list (N,) whose elements lie like this."""
+        (count,) = self.numbers("I")
+        if count == 0:
+            # There is nothing behind the number, not even what aligns elements.
+            return np.empty(0, layout.in_order(self._order))
+        at = self._aligned(layout.alignment)
+        found = np.frombuffer(self._data, layout.in_order(self._order), count, at)
+        self._at = at + found.nbytes
+        return found
+
+    def _unpack(self, kinds: str, alignment: int) -> tuple[Any, ...]:
+        form, at = f"{self._order}{kinds}", self._aligned(alignment)
+        try:
+            found = struct.unpack_from(form, self._data, at)
+        except struct.error as error:
+            raise ValueError(f"a message ends too early: {error}") from error
+        self._at = at + struct.calcsize(form)
+        return found
+
+    def _aligned(self, alignment: int) -> int:
+        """Return the next place that is a multiple of the alignment, from the body's begin on."""
+        return self._at + (_BODY - self._at) % alignment
 
 
 class RecordList(NamedTuple):
@@ -35,12 +127,8 @@ class RecordReader:
     """Reads messages that hold a header and a list of one type of records."""
 
     def __init__(self, record: Any) -> None:  # noqa: ANN401 (the class of a message)
-        """`record`: the type of the list's elements, all of whose fields are numbers."""
-        fields = record.get_fields_and_field_types()
-        layout = [(name, _NUMBERS[kind]) for name, kind in fields.items()]
-        native = np.dtype(layout, align=True)
-        self._alignment = native.alignment
-        self._layouts = {order: native.newbyteorder(order) for order in _ORDERS.values()}
+        """`record`: the type of the list's elements, as in `Layout.of_records`."""
+        self._layout = Layout.of_records(record)
 
     def of(self, message: Any) -> RecordList:  # noqa: ANN401 (of any such type)
         """Return a message as it arrives."""
@@ -52,24 +140,5 @@ class RecordReader:
         Raises:
             ValueError: it is encoded in another way, or ends too early.
         """
-        order = _ORDERS.get(data[:2])
-        if order is None:
-            raise ValueError(f"a message is encoded as {data[:2].hex()}, expected 0000 or 0001")
-        try:
-            seconds, nanoseconds, length = struct.unpack_from(f"{order}iII", data, _BODY)
-            begin = _BODY + 12
-            frame_id = data[begin : begin + length].rstrip(b"\0").decode(errors="replace")
-            at = _aligned(begin + length, 4)
-            (count,) = struct.unpack_from(f"{order}I", data, at)
-        except struct.error as error:
-            raise ValueError(f"a message ends too early: {error}") from error
-        # Without records there is nothing behind their number, not even what aligns them.
-        begin = _aligned(at + 4, self._alignment) if count else 0
-        records = np.frombuffer(data, self._layouts[order], count, begin)
-        stamp = Time(sec=seconds, nanosec=nanoseconds)
-        return RecordList(Header(stamp=stamp, frame_id=frame_id), records)
-
-
-def _aligned(at: int, alignment: int) -> int:
-    """Return the next place that is a multiple of the alignment, counted from the body's begin."""
-    return at + (_BODY - at) % alignment
+        cursor = Cursor(data)
+        return RecordList(cursor.header(), cursor.array(self._layout))

@@ -23,6 +23,7 @@ from risk_dqn_planner.errors import InputError
 from risk_dqn_planner.explanation.fields import NOTHING_EXPLAINED, Critical, Explanation, Verdict
 from risk_dqn_planner.policies.base import Supervision
 from risk_dqn_planner.ros import conversions
+from risk_dqn_planner.ros.situation_records import as_it_arrives
 from risk_dqn_planner.situation.inputs import EgoPose, Perception, object_arrays
 from risk_dqn_planner.situation.report import FaultyInput, SituationReport, Status
 from risk_dqn_planner.situation.warm_up import example_situation, square
@@ -178,9 +179,11 @@ def test_a_route_survives() -> None:
 
 
 def over_the_wire(report: SituationReport) -> SituationReport:
-    message = conversions.situation_to_message(report)
-    received = deserialize_message(serialize_message(message), SituationMessage)
-    return conversions.situation_from_message(received)
+    return read(conversions.situation_to_message(report))
+
+
+def read(message: SituationMessage) -> SituationReport:
+    return conversions.situation_from_records(as_it_arrives(message))
 
 
 def test_a_situation_survives_the_way_over_the_wire() -> None:
@@ -188,10 +191,25 @@ def test_a_situation_survives_the_way_over_the_wire() -> None:
     assert replace(received, situations=None) == replace(REPORT, situations=None)
     assert received.situations is not None
     assert REPORT.situations is not None
+    assert not received.situations.vehicle_mask[0, 1:].any()
     pairs = zip(REPORT.situations, received.situations, strict=True)
     for name, (before, after) in zip(REPORT.situations._fields, pairs, strict=True):
         assert after.dtype == before.dtype, name
-        assert after.tolist() == before.tolist(), name
+        held = after[:, :1] if name.startswith("vehicle_") else after
+        assert held.tolist() == before.tolist(), name
+
+
+def test_situations_of_a_few_vehicles_more_or_less_have_the_same_shape() -> None:
+    message = conversions.situation_to_message(REPORT)
+    (vehicle,) = message.vehicles
+    places = []
+    for count in (0, 1, 15, 16, 17, 32):
+        message.vehicles = [vehicle] * count
+        received = read(message).situations
+        assert received is not None
+        assert received.vehicle_mask.sum() == count
+        places.append(received.vehicle_mask.shape[1])
+    assert places == [16, 16, 16, 16, 32, 32]
 
 
 def test_a_situation_names_lanes_and_vehicles_by_id() -> None:
@@ -249,26 +267,26 @@ def test_a_situation_with_a_number_that_is_not_finite_is_refused() -> None:
     message = conversions.situation_to_message(REPORT)
     message.lanes[0].hidden_distance_m = math.nan
     with pytest.raises(InputError, match="lane_hidden_distance_m is not finite"):
-        conversions.situation_from_message(message)
+        read(message)
 
 
 def test_a_vehicle_on_a_lane_that_is_not_listed_is_refused() -> None:
     message = conversions.situation_to_message(REPORT)
     message.vehicles.append(RelevantVehicle(vehicle_id=5, lane_id=99))
     with pytest.raises(InputError, match="vehicle 5 is on lane 99, expected one of \\[1\\]"):
-        conversions.situation_from_message(message)
+        read(message)
 
 
 def test_a_lane_that_appears_twice_is_refused() -> None:
     message = conversions.situation_to_message(REPORT)
     message.lanes = [message.lanes[0], message.lanes[0]]
     with pytest.raises(InputError, match="a lane appears twice"):
-        conversions.situation_from_message(message)
+        read(message)
 
 
 def test_an_unknown_status_is_refused() -> None:
     with pytest.raises(InputError, match="situation: 77 is not a valid Status"):
-        conversions.situation_from_message(SituationMessage(status=77))
+        read(SituationMessage(status=77))
 
 
 def test_a_decision_survives_the_way_over_the_wire() -> None:

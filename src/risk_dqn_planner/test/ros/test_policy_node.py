@@ -9,6 +9,7 @@ from collections.abc import Iterator
 import pytest
 import rclpy
 from intersection_msgs.msg import Decision, Situation
+from rclpy.serialization import serialize_message
 
 from risk_dqn_planner.decision import Reason, fault_decision
 from risk_dqn_planner.ros import conversions
@@ -16,6 +17,7 @@ from risk_dqn_planner.ros.decider import Choice
 from risk_dqn_planner.ros.main import run_managed
 from risk_dqn_planner.ros.policy_node import PolicyNode
 from risk_dqn_planner.ros.qos import NEWEST
+from risk_dqn_planner.ros.situation_records import SituationRecords
 from risk_dqn_planner.situation.report import Status
 
 NO_TEXT = "\udc80"  # what Python makes of a byte that is no UTF-8; no message can hold it
@@ -48,15 +50,25 @@ def test_a_decision_that_fits_into_no_message_becomes_a_stop_that_does(
 def test_a_situation_that_cannot_be_read_for_a_reason_of_our_own_is_a_fault(
     node: PolicyNode, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def fail(_: Situation) -> None:
+    def fail(_: SituationRecords) -> None:
         raise ZeroDivisionError("of our own")
 
-    monkeypatch.setattr(conversions, "situation_from_message", fail)
-    node._on_situation(Situation(route=[1, 2]))
+    monkeypatch.setattr(conversions, "situation_from_records", fail)
+    node._on_situation(bytes(serialize_message(Situation(route=[1, 2]))))
     report = node._decider._report
     assert report is not None
     assert (report.status, report.situations) == (Status.INTERNAL_ERROR, None)
+    assert report.route == (1, 2)
     assert "of our own" in report.text
+
+
+def test_a_situation_that_ends_too_early_counts_as_not_received(
+    node: PolicyNode, capfd: pytest.CaptureFixture[str]
+) -> None:
+    whole = bytes(serialize_message(Situation(route=[1, 2])))
+    node._on_situation(whole[:-1])
+    assert node._decider._report is None
+    assert "a situation cannot be read: a message ends too early" in capfd.readouterr().err
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=lambda s: s.name)

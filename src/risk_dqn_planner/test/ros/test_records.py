@@ -9,11 +9,18 @@ import pytest
 from geometry_msgs.msg import Point32, Polygon, PolygonStamped, Quaternion
 from hypothesis import given
 from hypothesis import strategies as st
-from intersection_msgs.msg import PerceivedObject, PerceivedObjects, Situation
-from rclpy.serialization import serialize_message
+from intersection_msgs.msg import (
+    IntersectingLane,
+    PerceivedObject,
+    PerceivedObjects,
+    RelevantVehicle,
+    Situation,
+)
+from rclpy.serialization import deserialize_message, serialize_message
 
-from risk_dqn_planner.ros.conversions import header, read_area, read_objects
+from risk_dqn_planner.ros.conversions import header, read_area, read_objects, to_stamp
 from risk_dqn_planner.ros.records import RecordReader
+from risk_dqn_planner.ros.situation_records import read_situation
 
 numbers = st.floats(width=32)
 identities = st.integers(-(2**63), 2**63 - 1)
@@ -75,7 +82,79 @@ def test_a_message_that_is_encoded_in_another_way_is_refused() -> None:
         read_area(b"\0\7" + bytes(20))
 
 
+class Padded:
+    """Stands for the class of a message, as far as its layout goes."""
+
+    @staticmethod
+    def get_fields_and_field_types() -> dict[str, str]:
+        return {"distance_m": "double", "kind": "uint8"}
+
+
+class Misaligned:
+    """Its first field may begin where its second may not."""
+
+    @staticmethod
+    def get_fields_and_field_types() -> dict[str, str]:
+        return {"kind": "uint8", "distance_m": "double"}
+
+
 def test_only_records_of_numbers_can_be_read_at_once() -> None:
     assert RecordReader(Quaternion)
-    with pytest.raises(KeyError):
+    with pytest.raises(ValueError, match=r"Situation has fields of .*string.*, not numbers"):
         RecordReader(Situation)
+
+
+@pytest.mark.parametrize("record", [Padded, Misaligned])
+def test_records_that_lie_elsewhere_in_memory_than_on_the_wire_are_refused(record: type) -> None:
+    with pytest.raises(ValueError, match=f"{record.__name__} begins or ends with a field"):
+        RecordReader(record)
+
+
+lanes = st.builds(
+    IntersectingLane, lane_id=identities, kind=st.integers(0, 255), zone_m=numbers,
+    speed_limit_mps=numbers,
+)  # fmt: skip
+vehicles = st.builds(RelevantVehicle, vehicle_id=identities, lane_id=identities, speed_mps=numbers)
+situations = st.builds(
+    Situation,
+    header=st.builds(header, stamps, frames),
+    status=st.integers(0, 255),
+    faulty_input=st.integers(0, 255),
+    status_text=frames,
+    route=st.lists(identities, max_size=4),
+    route_stamp=st.builds(to_stamp, stamps),
+    stop_line_distance_m=numbers,
+    stop_line_derived=st.booleans(),
+    goal_distance_m=numbers,
+    ego_speed_mps=numbers,
+    lanes=st.lists(lanes, max_size=3),
+    vehicles=st.lists(vehicles, max_size=5),
+)
+
+
+@given(situations)
+def test_a_situation_is_read_as_rclpy_reads_it(sent: Situation) -> None:
+    data = bytes(serialize_message(sent))
+    read, expected = read_situation(data), deserialize_message(data, Situation)
+    assert set(read._fields) == set(expected.get_fields_and_field_types())
+    for name, value in zip(read._fields, read, strict=True):
+        known = getattr(expected, name)
+        if name in ("lanes", "vehicles"):
+            for k, record in enumerate(known):
+                assert value.dtype.names == tuple(record.get_fields_and_field_types())
+                for column in value.dtype.names:
+                    assert same(value[k][column], getattr(record, column)), column
+            assert len(value) == len(known)
+        elif name == "route":
+            assert value.tolist() == known.tolist()
+        else:
+            assert value == known or same(value, known), name
+
+
+def test_a_situation_that_ends_too_early_is_refused_wherever_it_ends() -> None:
+    lanes, vehicles = [IntersectingLane(lane_id=3)], [RelevantVehicle(lane_id=3)]
+    sent = Situation(route=[1, 2], status_text="what", lanes=lanes, vehicles=vehicles)
+    whole = bytes(serialize_message(sent))
+    for length in range(len(whole)):
+        with pytest.raises(ValueError, match=r"expected 0000 or 0001|too early|smaller|offset"):
+            read_situation(whole[:length])

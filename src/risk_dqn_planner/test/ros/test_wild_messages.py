@@ -30,6 +30,7 @@ from risk_dqn_planner.ros.adapters.kinds import ObjectsAdapter
 from risk_dqn_planner.ros.decider import Decider, DeciderConfig
 from risk_dqn_planner.ros.evaluation import Evaluation
 from risk_dqn_planner.ros.parameters import EgoParameters, MapParameters
+from risk_dqn_planner.ros.situation_records import as_it_arrives
 from risk_dqn_planner.ros.synchroniser import Frame
 from risk_dqn_planner.situation.config import SituationConfig
 from risk_dqn_planner.situation.pipeline import SituationPipeline
@@ -153,7 +154,8 @@ def test_whatever_is_perceived_gives_a_sound_situation_or_a_fault_that_is_the_in
         report, _ = node.report(frame)
         assert not complaints
         if report.status is Status.OK:
-            back = conversions.situation_from_message(conversions.situation_to_message(report))
+            message = conversions.situation_to_message(report)
+            back = conversions.situation_from_records(as_it_arrives(message))
             assert back.situations is not None
         else:
             assert report.status is not Status.INTERNAL_ERROR
@@ -198,7 +200,7 @@ def situations(draw: st.DrawFn, values: st.SearchStrategy[float]) -> Situation:
 
 def read_or_refused(message: Situation) -> SituationReport | InputError:
     try:
-        return conversions.situation_from_message(message)
+        return conversions.situation_from_records(as_it_arrives(message))
     except InputError as error:
         return error
 

@@ -11,7 +11,8 @@ class Effort:
     peer_s: processor time of a peer's turn. paper_steps: of the preset `paper`, from which the
     whole run is extrapolated. seeds: trainings of ours whose median counts. sb3_limit_s: when
     stable-baselines3 is stopped, None for ten times ours and a margin; ours_limit_s: when ours is.
-    drive_s: of traffic played to the nodes in real time. node_decisions: asked of the policy node.
+    drive_s: of traffic played to the nodes in real time. node_decisions: asked of the
+    policy node in each of `node_rounds`.
     """
 
     rounds: int = 5
@@ -25,6 +26,7 @@ class Effort:
     ours_limit_s: float = 120.0
     drive_s: float = 100.0
     node_decisions: int = 400
+    node_rounds: int = 3
 
 
 QUICK = Effort(
@@ -39,4 +41,5 @@ QUICK = Effort(
     ours_limit_s=3.0,
     drive_s=5.0,
     node_decisions=40,
+    node_rounds=1,
 )

@@ -10,7 +10,7 @@ from rclpy.serialization import deserialize_message, serialize_message
 
 import bench  # noqa: F401 (finds the packages' own benchmarks)
 from bench.nodes.answering import restamped
-from bench.nodes.listening import spread, uneven
+from bench.nodes.listening import Spread, spread, typical, uneven
 from bench.nodes.page import write_page
 from bench.nodes.scene import MovingScene, perception
 from risk_dqn_planner.intersection.model import IntersectionModel
@@ -25,6 +25,11 @@ def test_unevenness_is_how_far_intervals_are_from_the_period() -> None:
 def test_a_spread_of_one_to_a_hundred() -> None:
     found = spread([float(k) for k in range(1, 101)])
     assert found == pytest.approx((100, 50.5, 99.01, 100.0))
+
+
+def test_what_is_typical_is_the_median_of_the_rounds() -> None:
+    rounds = [Spread(10, 3.0, 5.0, 6.0), Spread(9, 3.5, 11.0, 16.0), Spread(10, 2.0, 4.0, 5.0)]
+    assert typical(rounds) == (29, 3.0, 5.0, 16.0)
 
 
 def test_a_spread_of_nothing_is_refused() -> None:
@@ -61,7 +66,7 @@ def test_the_page_says_what_was_measured_and_which_goal_was_missed(tmp_path: Pat
                     "begun": "2026-01-02T03:04:05+00:00"},
         "versions": {"python": "3.12.3", "git_revision": "abcdef0123456789"},
         "figures": {"nodes": {"drives": {"50 objects, undisturbed": drive},
-                              "decision": {"tuned": took}}},
+                              "decision": {"tuned": took}, "plain_work": took}},
         "goals": {"decision, tuned, p99 [ms]": {"value": 8.25, "goal": {"at_most": 5.0},
                                                 "reached": False}},
     }  # fmt: skip
@@ -80,6 +85,7 @@ def test_the_page_says_what_was_measured_and_which_goal_was_missed(tmp_path: Pat
     write_page(measured, soak, tmp_path / "memory.png", tmp_path / "timing.md")
     text = (tmp_path / "timing.md").read_text()
     assert "| tuned | 4.0 | 8.2 | 9.0 | 100 |" in text
+    assert "| plain Python | 4.0 | 8.2 | 9.0 | 100 |" in text
     assert "| decision, tuned, p99 [ms] | 8.2 | 5 | **missed** |" in text
     assert "| policy_node | 400.0 | 401.0 | +0.50 | 14 / 14 | 18 / 18 |" in text
     assert (tmp_path / "images" / "soak.png").read_bytes() == b"picture"

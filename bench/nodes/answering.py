@@ -34,6 +34,7 @@ _WARM_UP = 10
 _FIRST_FAULT = 20  # reasons from here on are faults, see Decision.msg
 _NOTICE_S = 0.03  # the node has seen the clock by then
 _ANSWER_S = 0.5
+_WORK = 30_000  # some milliseconds
 _LOST = 0.5  # share of decisions that may be lost: a busy computer loses messages of the clock
 
 
@@ -107,6 +108,21 @@ class _Asker:
         if is_fault or conversions.to_ns(decision.situation_stamp) != stamp_ns:
             return None
         return 1e3 * (arrival.at_s - began_s)
+
+
+def plain_work(count: int) -> Spread:
+    """Return how long the same lines of Python take, each time after as long a pause.
+
+    What they vary by is the computer's doing and nobody's that is measured here.
+    """
+    took = []
+    with undisturbed():
+        for _ in range(count):
+            time.sleep(_NOTICE_S)
+            began_s = time.perf_counter()
+            sum(k * k for k in range(_WORK))
+            took.append(1e3 * (time.perf_counter() - began_s))
+    return spread(took[_WARM_UP:])
 
 
 def answers(settings: RunSettings, asked: list[bytes], logs: Path) -> Spread:

@@ -40,6 +40,16 @@ def spread(waits_ms: Sequence[float]) -> Spread:
     return Spread(len(waits_ms), float(p50_ms), float(p99_ms), float(max_ms))
 
 
+def typical(rounds: Sequence[Spread]) -> Spread:
+    """Return the medians of several rounds: what else the computer does spoils some of them.
+
+    All that was timed counts, and the longest is that of all rounds.
+    """
+    p50_ms, p99_ms = (np.median([each[k] for each in rounds]) for k in (1, 2))
+    timed, max_ms = sum(each.timed for each in rounds), max(each.max_ms for each in rounds)
+    return Spread(timed, float(p50_ms), float(p99_ms), max_ms)
+
+
 def uneven(arrivals_s: Sequence[float], period_s: float) -> list[float]:
     """Return by how much each interval between arrivals differs from the period [ms]."""
     return [1e3 * abs(step - period_s) for step in np.diff(arrivals_s).tolist()]

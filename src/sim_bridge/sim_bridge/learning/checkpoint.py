@@ -109,16 +109,30 @@ class RunFolder:
         (self.path / CHECKPOINT).unlink(missing_ok=True)
         return policy
 
-    def _require_same(self, found: object) -> None:
-        expected = self._run.description()
-        if found != expected:
+    def _require_same(self, found: dict[str, Any]) -> None:
+        before, now = _flat(found), _flat(self._run.description())
+        changed = [
+            f"{name} was {before.get(name)}, now {now.get(name)}"
+            for name in sorted(before.keys() | now.keys())
+            if before.get(name) != now.get(name)
+        ]
+        if changed:
             raise ConfigurationError(
-                f"{self.path} holds another training run, expected {expected}; "
+                f"{self.path} holds another training run: {'; '.join(changed)}; "
                 "choose another output folder or delete this one"
             )
 
     def _write_json(self, name: str, content: object) -> None:
         (self.path / name).write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+
+
+def _flat(content: dict[str, Any]) -> dict[str, Any]:
+    """Return nested dictionaries as one, with names such as config.steps."""
+    found: dict[str, Any] = {}
+    for name, value in content.items():
+        inner = _flat(value) if isinstance(value, dict) else None
+        found |= {name: value} if inner is None else {f"{name}.{k}": v for k, v in inner.items()}
+    return found
 
 
 def versions() -> dict[str, str]:

@@ -5,6 +5,7 @@ from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from risk_dqn_planner.errors import ConfigurationError
+from risk_dqn_planner.map.loader import DEFAULT_PROJECTOR
 from risk_dqn_planner.policies.outlook import OutlookConfig
 from risk_dqn_planner.policies.supervised import SupervisorMode, supervisor_mode
 from risk_dqn_planner.safety.assumptions import SafetyAssumptions
@@ -19,6 +20,8 @@ class Run:
     map_name, scenario: one name, or several with commas between them. supervisor: `enforce` lets
     only actions be taken, learned from and validated that are sound under `assumptions`; `off`
     lets all be. memory: how the planner tells where hidden vehicles may be, see SituationConfig.
+    route, origin, projector: how a map of one's own is read, as on the command line; None: the
+    only way that there is.
     """
 
     config: TrainingConfig
@@ -29,6 +32,9 @@ class Run:
     supervisor: str = SupervisorMode.OFF.value
     memory: str = INSTANTANEOUS
     assumptions: SafetyAssumptions = field(default_factory=SafetyAssumptions)
+    route: str | None = None
+    origin: str | None = None
+    projector: str = DEFAULT_PROJECTOR
 
     def __post_init__(self) -> None:
         if self.seed < 0:
@@ -72,6 +78,9 @@ class Run:
             del found["config"]["outlook"]
         if self.config.advice is None:
             del found["config"]["advice"]
+        for name, usual in (("route", None), ("origin", None), ("projector", DEFAULT_PROJECTOR)):
+            if found[name] == usual:
+                del found[name]
         return found
 
     @property

@@ -131,8 +131,11 @@ def main(argv: Sequence[str] | None = None) -> int:
             scenario=arguments.scenario,
             supervisor=arguments.supervisor,
             memory=arguments.memory,
+            route=arguments.route,
+            origin=arguments.origin,
+            projector=arguments.projector,
         )
-        places = [Places.named(name, route, origin, arguments.projector) for name in run.map_names]
+        places = [Places.named(name, route, origin, run.projector) for name in run.map_names]
         folder = RunFolder(out, run)
         if folder.finished:
             console.print(f"{out} is trained already; delete it to train again")

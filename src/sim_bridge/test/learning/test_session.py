@@ -154,8 +154,13 @@ def test_a_folder_of_another_run_is_refused(tmp_path: Path) -> None:
     one = session()
     next(one.run())
     RunFolder(tmp_path, TINY).save(one)
-    other = replace(TINY, seed=9)
-    with pytest.raises(ConfigurationError, match="holds another training run"):
+    config = replace(TINY.config, gamma=0.5)
+    other = replace(TINY, seed=9, config=config, route="3, 4")
+    text = (
+        rf"holds another training run: config.gamma was {TINY.config.gamma}, now 0.5; "
+        rf"route was None, now 3, 4; seed was {TINY.seed}, now 9; choose another"
+    )
+    with pytest.raises(ConfigurationError, match=text):
         RunFolder(tmp_path, other).resume(session(other))
 
 

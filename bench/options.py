@@ -11,8 +11,8 @@ class Effort:
     peer_s: processor time of a peer's turn. paper_steps: of the preset `paper`, from which the
     whole run is extrapolated. seeds: trainings of ours whose median counts. sb3_limit_s: when
     stable-baselines3 is stopped, None for ten times ours and a margin; ours_limit_s: when ours is.
-    drive_s: of traffic played to the nodes in real time. node_decisions: asked of the
-    policy node in each of `node_rounds`.
+    drive_s: of traffic played to the nodes in real time. node_decisions: asked of the policy node
+    in each of `node_rounds`.
     """
 
     rounds: int = 5

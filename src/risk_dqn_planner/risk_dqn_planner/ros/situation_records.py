@@ -5,9 +5,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from builtin_interfaces.msg import Time
-from intersection_msgs.msg import IntersectingLane, RelevantVehicle, Situation
+from intersection_msgs.msg import IntersectingLane, RelevantVehicle
 from numpy.typing import NDArray
-from rclpy.serialization import serialize_message
 from std_msgs.msg import Header
 
 from risk_dqn_planner.ros.records import Cursor, Layout
@@ -31,11 +30,6 @@ class SituationRecords(NamedTuple):
     ego_speed_mps: float
     lanes: NDArray[Any]
     vehicles: NDArray[Any]
-
-
-def as_it_arrives(message: Situation) -> SituationRecords:
-    """Return a message as a receiver reads it."""
-    return read_situation(bytes(serialize_message(message)))
 
 
 def read_situation(data: bytes) -> SituationRecords:

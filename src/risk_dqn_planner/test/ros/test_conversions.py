@@ -23,7 +23,7 @@ from risk_dqn_planner.errors import InputError
 from risk_dqn_planner.explanation.fields import NOTHING_EXPLAINED, Critical, Explanation, Verdict
 from risk_dqn_planner.policies.base import Supervision
 from risk_dqn_planner.ros import conversions
-from risk_dqn_planner.ros.situation_records import as_it_arrives
+from risk_dqn_planner.ros.situation_records import read_situation
 from risk_dqn_planner.situation.inputs import EgoPose, Perception, object_arrays
 from risk_dqn_planner.situation.report import FaultyInput, SituationReport, Status
 from risk_dqn_planner.situation.warm_up import example_situation, square
@@ -183,7 +183,7 @@ def over_the_wire(report: SituationReport) -> SituationReport:
 
 
 def read(message: SituationMessage) -> SituationReport:
-    return conversions.situation_from_records(as_it_arrives(message))
+    return conversions.situation_from_records(read_situation(bytes(serialize_message(message))))
 
 
 def test_a_situation_survives_the_way_over_the_wire() -> None:

@@ -17,6 +17,7 @@ from intersection_msgs.msg import (
     Situation,
 )
 from nav_msgs.msg import Odometry
+from rclpy.serialization import serialize_message
 
 from risk_dqn_planner.decision import Action, explain
 from risk_dqn_planner.errors import DisconnectedRouteError, InputError
@@ -30,7 +31,7 @@ from risk_dqn_planner.ros.adapters.kinds import ObjectsAdapter
 from risk_dqn_planner.ros.decider import Decider, DeciderConfig
 from risk_dqn_planner.ros.evaluation import Evaluation
 from risk_dqn_planner.ros.parameters import EgoParameters, MapParameters
-from risk_dqn_planner.ros.situation_records import as_it_arrives
+from risk_dqn_planner.ros.situation_records import read_situation
 from risk_dqn_planner.ros.synchroniser import Frame
 from risk_dqn_planner.situation.config import SituationConfig
 from risk_dqn_planner.situation.pipeline import SituationPipeline
@@ -155,7 +156,7 @@ def test_whatever_is_perceived_gives_a_sound_situation_or_a_fault_that_is_the_in
         assert not complaints
         if report.status is Status.OK:
             message = conversions.situation_to_message(report)
-            back = conversions.situation_from_records(as_it_arrives(message))
+            back = over_the_wire(message)
             assert back.situations is not None
         else:
             assert report.status is not Status.INTERNAL_ERROR
@@ -198,9 +199,13 @@ def situations(draw: st.DrawFn, values: st.SearchStrategy[float]) -> Situation:
     )
 
 
+def over_the_wire(message: Situation) -> SituationReport:
+    return conversions.situation_from_records(read_situation(bytes(serialize_message(message))))
+
+
 def read_or_refused(message: Situation) -> SituationReport | InputError:
     try:
-        return conversions.situation_from_records(as_it_arrives(message))
+        return over_the_wire(message)
     except InputError as error:
         return error
 

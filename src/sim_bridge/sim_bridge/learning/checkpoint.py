@@ -110,28 +110,32 @@ class RunFolder:
         return policy
 
     def _require_same(self, found: dict[str, Any]) -> None:
-        before, now = _flat(found), _flat(self._run.description())
-        changed = [
+        expected = self._run.description()
+        if found == expected:
+            return
+        before, now, missing = _flat(found), _flat(expected), object()
+        changed = "; ".join(
             f"{name} was {before.get(name)}, now {now.get(name)}"
             for name in sorted(before.keys() | now.keys())
-            if before.get(name) != now.get(name)
-        ]
-        if changed:
-            raise ConfigurationError(
-                f"{self.path} holds another training run: {'; '.join(changed)}; "
-                "choose another output folder or delete this one"
-            )
+            if before.get(name, missing) != now.get(name, missing)
+        )
+        raise ConfigurationError(
+            f"{self.path} holds another training run: {changed}; "
+            "choose another output folder or delete this one"
+        )
 
     def _write_json(self, name: str, content: object) -> None:
         (self.path / name).write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
 
 
-def _flat(content: dict[str, Any]) -> dict[str, Any]:
+def _flat(content: dict[str, Any], prefix: str = "") -> dict[str, Any]:
     """Return nested dictionaries as one, with names such as config.steps."""
     found: dict[str, Any] = {}
     for name, value in content.items():
-        inner = _flat(value) if isinstance(value, dict) else None
-        found |= {name: value} if inner is None else {f"{name}.{k}": v for k, v in inner.items()}
+        if isinstance(value, dict):
+            found |= _flat(value, f"{prefix}{name}.")
+        else:
+            found[prefix + name] = value
     return found
 
 

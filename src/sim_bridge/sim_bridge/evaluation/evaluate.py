@@ -25,7 +25,7 @@ from sim_bridge.evaluation.cells import Cell, cells_of, paper_cells
 from sim_bridge.evaluation.contestants import DEFAULT_POLICIES, contestants, named_policies
 from sim_bridge.evaluation.progress import progress_on
 from sim_bridge.evaluation.rollout import Contestant
-from sim_bridge.evaluation.soundness.cells import MAPS, POLICIES
+from sim_bridge.evaluation.soundness.cells import MAPS, POLICIES, UNAIDED
 from sim_bridge.evaluation.soundness.evaluate import (
     EPISODES,
     LIMIT_EPISODES,
@@ -61,7 +61,8 @@ def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
     add(
         "--sound-episodes",
         type=int,
-        help=f"that sound policies drive where they may not collide ({SOUNDNESS}) [as --episodes]",
+        help=f"that {' and '.join(UNAIDED)} drive where they may not collide ({SOUNDNESS}) "
+        "[as --episodes]",
     )
     add(
         "--limit-episodes",

@@ -14,6 +14,8 @@ TUNED, SUPERVISED, SOUND_DQN = "tuned", "tuned+supervisor", "sound_dqn"
 POLICIES = (FASTEST_SOUND, LOOK_AHEAD, SOUND_DQN, SUPERVISED, TUNED, RULE_BASED)
 # Those that search at each decision, and so take a hundred times as long.
 SEARCHING = (LOOK_AHEAD,)
+# Those that choose among sound actions themselves, without a search.
+UNAIDED = (FASTEST_SOUND, SOUND_DQN)
 # Those whose every action is sound where the assumptions hold.
 SOUND = (FASTEST_SOUND, LOOK_AHEAD, SOUND_DQN, SUPERVISED)
 

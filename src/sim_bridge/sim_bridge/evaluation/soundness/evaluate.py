@@ -17,6 +17,7 @@ from sim_bridge.evaluation.rollout import Clairvoyant, Contestant
 from sim_bridge.evaluation.soundness.cells import (
     GOAL,
     SEARCHING,
+    UNAIDED,
     SoundnessCell,
     missing_scenarios,
     soundness_cells,
@@ -38,7 +39,7 @@ class Plan:
 
     search_episodes: the first ones, for policies that search at each decision; limit_episodes:
     the first ones of those, for the limits. sound_episodes: for all others that take sound actions
-    only, in the cells where these may not collide; None for as many as elsewhere.
+    by themselves, in the cells where these may not collide; None for as many as elsewhere.
 
     maps, scenarios, policies: only these; empty for all. output: folder of finished cells.
     """
@@ -78,7 +79,7 @@ class Plan:
         """Return how many episodes of a cell a policy drives."""
         if policy in SEARCHING:
             return min(self.episodes, self.search_episodes)
-        if is_sound(policy) and cell.part == GOAL and self.sound_episodes is not None:
+        if policy in UNAIDED and cell.part == GOAL and self.sound_episodes is not None:
             return max(self.sound_episodes, self.limited)
         return self.episodes
 

@@ -10,7 +10,7 @@ from sim_bridge.evaluation import campaign, evaluate
 from sim_bridge.evaluation.soundness.beam import BeamConfig
 from sim_bridge.evaluation.soundness.cells import soundness_cells
 from sim_bridge.evaluation.soundness.evaluate import Plan
-from sim_bridge.evaluation.soundness.reporting.tables import at_a_glance, outcome
+from sim_bridge.evaluation.soundness.reporting.tables import at_a_glance, cells_reached, outcome
 
 OPTIONS = [
     "--set", "soundness", "--episodes", "6", "--limit-episodes", "2", "--map", "four_way",
@@ -113,10 +113,11 @@ def test_policies_that_search_drive_fewer_episodes_but_all_whose_limits_are_sear
 def test_who_may_not_collide_can_be_asked_for_more_episodes() -> None:
     plan = Plan(Path("out"), episodes=2000, sound_episodes=100_000, search_episodes=300)
     goal, other = soundness_cells()[0], soundness_cells()[-1]
-    for policy in ("fastest_sound", "sound_dqn", "tuned+supervisor"):
+    for policy in ("fastest_sound", "sound_dqn"):
         assert plan.episodes_of(policy, goal) == 100_000
         assert plan.episodes_of(policy, other) == 2000
-    assert plan.episodes_of("tuned", goal) == 2000
+    for policy in ("tuned+supervisor", "tuned"):
+        assert plan.episodes_of(policy, goal) == 2000
     assert plan.episodes_of("look_ahead", goal) == 300
     with pytest.raises(ConfigurationError, match="sound_episodes is 0"):
         Plan(Path("out"), sound_episodes=0)
@@ -137,3 +138,22 @@ def test_a_glance_takes_the_mean_of_the_cells_and_all_collisions() -> None:
     row = at_a_glance([first, {**second, "mean_speed_mps": {"mean": 2.0}}]).splitlines()[-1]
     # 2 + 1 changes in 20 + 80 decisions.
     assert row == "| brave | 2 | 75.0 | 3.00 | 10.0 | 3.0 | 10.0 | 3 |"
+
+
+def test_cells_are_counted_that_come_near_the_limit_of_their_own() -> None:
+    def line(policy: str, scenario: str, success: float, mps: float) -> dict[str, Any]:
+        limits = {"sound_limit": {"rate": 0.5}, "success": {"rate": success}}
+        return {
+            "policy": policy, "map": "four_way", "scenario": scenario, "sensor_forward_m": 0.0,
+            "mean_speed_mps": {"mean": mps},
+            "limits": {**limits, "mean_speed_mps": {"mean": mps}},
+        }  # fmt: skip
+
+    lines = [
+        line("sound_limit", "base", 0.5, 4.0), line("brave", "base", 0.49, 3.9),
+        line("sound_limit", "fog", 0.5, 2.0), line("brave", "fog", 0.49, 1.8),
+        line("sound_limit", "rain", 0.5, 2.0), line("brave", "rain", 0.48, 2.0),
+        line("brave", "nobody searched", 1.0, 4.0),
+    ]  # fmt: skip
+    row = cells_reached(lines, ["brave"]).splitlines()[-1]
+    assert row == "| brave | 3 | 2 | 2 | 1 |"

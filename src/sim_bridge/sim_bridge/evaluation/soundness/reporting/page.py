@@ -19,6 +19,7 @@ from sim_bridge.evaluation.soundness.reporting.tables import (
     at_a_glance,
     by_map,
     by_traffic,
+    cells_reached,
     collisions_in_all,
     full,
     limits_of,
@@ -76,7 +77,7 @@ _REACHED = """\
 ## How much of it is reached
 
 Success and mean speed in % of the sound limit's, in the same episodes.
-Below {success:.0f} and {speed:.0f} in *italics*.
+Below {success:.0f} and {speed:.0f} in *italics*. First in how many cells each policy is not below.
 """
 
 _TIMEOUTS = """\
@@ -165,6 +166,7 @@ def _limits(lines: Sequence[Line]) -> str:
             by_map(lines, SOUND_LIMIT, limits_of, "clairvoyant / sound limit"),
             folded("The ways found by the searches alone, with intervals", details),
             _REACHED.format(success=100 * SUCCESS_WANTED, speed=100 * SPEED_WANTED),
+            cells_reached(lines, sound),
             *(by_map(lines, policy, show, f"`{policy}`") for policy in sound),
             _TIMEOUTS,
             timeouts(lines),

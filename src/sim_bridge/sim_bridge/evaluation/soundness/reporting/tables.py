@@ -108,20 +108,52 @@ def limits_of(line: Line | None) -> str:
 
 def reached(lines: Sequence[Line]) -> Callable[[Line | None], str]:
     """Return what shows success and speed of a line relative to the sound limit of its cell."""
-    limits = {(line["map"], where(line)): line for line in lines if line["policy"] == SOUND_LIMIT}
+    shares = _shares_of_limit(lines)
 
     def show(line: Line | None) -> str:
-        limit = None if line is None else limits.get((line["map"], where(line)))
-        if line is None or limit is None or limit["limits"]["sound_limit"]["rate"] <= 0.0:
+        found = None if line is None else shares(line)
+        if found is None:
             return NOTHING
-        success = line["limits"]["success"]["rate"] / limit["limits"]["sound_limit"]["rate"]
-        speed = line["limits"]["mean_speed_mps"]["mean"] / limit["mean_speed_mps"]["mean"]
         return " / ".join(
             f"{100 * value:.0f}" if value >= wanted else f"*{100 * value:.0f}*"
-            for value, wanted in ((success, SUCCESS_WANTED), (speed, SPEED_WANTED))
+            for value, wanted in zip(found, (SUCCESS_WANTED, SPEED_WANTED), strict=True)
         )
 
     return show
+
+
+def cells_reached(lines: Sequence[Line], policies: Iterable[str]) -> str:
+    """Return in how many cells each policy comes as near to the sound limit as is wanted."""
+    shares = _shares_of_limit(lines)
+    rows = []
+    for policy in policies:
+        own = [shares(line) for line in lines if line["policy"] == policy]
+        known = [found for found in own if found is not None]
+        success = [share >= SUCCESS_WANTED for share, _ in known]
+        speed = [share >= SPEED_WANTED for _, share in known]
+        both = [all(pair) for pair in zip(success, speed, strict=True)]
+        counts = (len(known), sum(success), sum(speed), sum(both))
+        rows.append([policy, *(str(number) for number in counts)])
+    header = [
+        "policy", "cells", f"success at least {100 * SUCCESS_WANTED:.0f}%",
+        f"speed at least {100 * SPEED_WANTED:.0f}%", "both",
+    ]  # fmt: skip
+    return table(header, rows)
+
+
+def _shares_of_limit(lines: Sequence[Line]) -> Callable[[Line], tuple[float, float] | None]:
+    """Return what gives success and mean speed of a line as shares of its cell's sound limit."""
+    limits = {(line["map"], where(line)): line for line in lines if line["policy"] == SOUND_LIMIT}
+
+    def shares(line: Line) -> tuple[float, float] | None:
+        limit = limits.get((line["map"], where(line)))
+        if limit is None or limit["limits"]["sound_limit"]["rate"] <= 0.0:
+            return None
+        success = line["limits"]["success"]["rate"] / limit["limits"]["sound_limit"]["rate"]
+        speed = line["limits"]["mean_speed_mps"]["mean"] / limit["mean_speed_mps"]["mean"]
+        return success, speed
+
+    return shares
 
 
 def timeouts(lines: Sequence[Line]) -> str:

@@ -85,7 +85,9 @@ def explain(
     config = config or RuleBasedConfig()
     assumptions = assumptions or assumptions_of(config)
     answer = answer_of(decisions, index)
-    one = Situations._make(field[index : index + 1] for field in situations)
+    one = situations
+    if len(situations.ego_speed_mps) > 1:
+        one = Situations._make(field[index : index + 1] for field in situations)
     explanation, (vehicle, lane) = weigh(answer, one, config, assumptions)
     decision = Decision(
         action=answer.action,

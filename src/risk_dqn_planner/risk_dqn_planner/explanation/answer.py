@@ -96,14 +96,8 @@ def _checked(decisions: Decisions, index: int) -> tuple[Checked, ...] | None:
     check = decisions.check
     if check is None:
         return None
+    rows = zip(*(field[index].tolist() for field in check), strict=True)
     return tuple(
-        Checked(
-            bool(check.admissible[index, action]),
-            int(check.periods[index, action]),
-            float(check.margin_s[index, action]),
-            Pair(
-                int(check.critical_vehicle[index, action]), int(check.critical_lane[index, action])
-            ),
-        )
-        for action in Action
+        Checked(admissible, periods, margin_s, Pair(vehicle, lane))
+        for admissible, periods, margin_s, vehicle, lane in rows
     )

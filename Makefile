@@ -37,7 +37,7 @@ COLLISION_AWARE_PAPER := --preset paper --reward collision --name collision_awar
 TUNED := --preset tuned --reward collision --steps 3000000 --name tuned \
   --map four_way,t_junction,multi_lane,roundabout \
   --scenario base,dense_traffic,severe_occlusion,close_small_obstacle
-SOUND_DQN := --preset advised --reward progress --steps 1000000 --supervisor enforce \
+SOUND_DQN := --preset advised --reward progress --steps 2000000 --supervisor enforce \
   --name sound_dqn --map four_way,t_junction,multi_lane,roundabout \
   --scenario base,dense_traffic,severe_occlusion,close_small_obstacle,short_sensor_range
 

@@ -1,18 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a network is told beyond the paper's state: what is sound, and what waiting would bring.
 
-    action in force | sound actions | margins of going on after each action | next place | forecast
-    3, one is 1     | 3, 0 or 1     | 3                                     | 4          | 3 x K
+    action in force | sound actions | margins of going on after each action | next place
+    3, one is 1     | 3, 0 or 1     | 3                                     | 4
 
-    creeping | way left after each action | what of it hops cannot fill
-    0 or 1   | 3                          | 3
+    forecast | is it enough? | creeping | way left after each action | what of it hops cannot fill
+    5 x K    | 5 x K, 0 or 1 | 0 or 1   | 3                          | 3
 
 The margins are the joint check's, if the ego goes on through everything after the action; the
-forecast is that of going after k periods of waiting, in three ways. The next place is where the
-ego can wait: the way to the next zone, to the place, through the zones behind it, and whether it
-joins a lane there. Creeping is 1 where the ego will not see enough before it stands at that place,
-so that decimetres matter: then the network has to choose hops that end there. The same object
-serves a batch in training and a batch of one on the vehicle; rows are independent.
+forecast is that of going after k periods of waiting, in five ways. Which of these margins are
+enough is told besides: hundredths of a second decide that, which a network hardly tells apart.
+The next place is where the ego can wait: the way to the next zone, to the place, through the zones
+behind it, and whether it joins a lane there. Creeping is 1 where the ego will not see enough before
+it stands at that place, so that decimetres matter: then the network has to choose hops that end
+there. The same object serves a batch in training and a batch of one on the vehicle; rows are
+independent.
 """
 
 import math
@@ -53,8 +55,9 @@ _ROUNDING = 1e-6
 
 LAYOUT = (
     "action in force (3), sound (3), margins of going (3), next place (free, rest, zones, joins), "
-    "margins of going after k periods of (Stop, Slow, coming nearer), creeping, "
-    "way left after each action (3), shortfall after each action (3)"
+    "margins of going after k periods of (Stop, Slow, coming nearer, that after a period of Stop, "
+    "of Slow), which of them are enough, creeping, way left after each action (3), "
+    "shortfall after each action (3)"
 )
 _IN_FORCE, _SOUND, _GOING, _PLACE = 0, ACTIONS, 2 * ACTIONS, 3 * ACTIONS
 _LATER = _PLACE + 4
@@ -95,7 +98,7 @@ class OutlookConfig:
     @property
     def size(self) -> int:
         """How many numbers there are for each situation."""
-        return _LATER + WAYS_TO_WAIT * self.periods + _CREEPING
+        return _LATER + 2 * WAYS_TO_WAIT * self.periods + _CREEPING
 
 
 class Views(NamedTuple):
@@ -186,7 +189,7 @@ def look_into(
     """Fill the inputs (B, E) row by row."""
     lanes, periods = s.lane_mask.shape[1], c.decisions - 1
     arrival_s, who = np.empty(lanes), np.empty(lanes, dtype=np.int64)
-    later_s = np.empty((WAYS_TO_WAIT, periods))
+    later_s, ego = np.empty((WAYS_TO_WAIT, periods)), np.empty((WAYS_TO_WAIT, 3))
     for row in range(s.ego_speed_mps.shape[0]):
         foresee(s, row, known, p, arrival_s, who)
         now_mps = max(s.ego_speed_mps[row], 0.0)
@@ -200,11 +203,8 @@ def look_into(
         t = Task(s, row, p, c, known, corner_m, sound, in_force)
         place = next_place(t, w)
         tell_place(place, most_m, inputs[row, _PLACE:_LATER])
-        forecast(t, place, periods, w, later_s)
-        for action in range(WAYS_TO_WAIT):
-            for k in range(periods):
-                at = _LATER + action * periods + k
-                inputs[row, at] = share_of(later_s[action, k], most_s)
+        forecast(t, place, periods, w, ego, later_s)
+        tell_forecast(later_s, most_s, inputs[row, _LATER:])
         tell_hops(t, place, w, inputs[row, inputs.shape[1] - _CREEPING :])
 
 
@@ -223,6 +223,17 @@ def tell_place(place: Place, most_m: float, inputs: Inputs) -> None:
     if place.rest_m < math.inf:
         inputs[2] = min((place.clear_m - place.rest_m) / (0.5 * most_m), 1.0)
         inputs[3] = 1.0 if place.joins else 0.0
+
+
+@kernel
+def tell_forecast(later_s: Floats, most_s: float, inputs: Inputs) -> None:
+    """Fill the margins (5, K) as shares, and behind them which are enough."""
+    ways, periods = later_s.shape
+    for wait in range(ways):
+        for k in range(periods):
+            at = wait * periods + k
+            inputs[at] = share_of(later_s[wait, k], most_s)
+            inputs[ways * periods + at] = 1.0 if later_s[wait, k] >= -_ROUNDING else 0.0
 
 
 @kernel

@@ -20,6 +20,7 @@ Make = Callable[..., Situations]
 AT_THE_ZONE: dict[str, Any] = {"id": 3, "ego_m": 3.15}
 THROUGH_S = 2.8636
 COMING: dict[str, Any] = {"id": 8, "lane": 3, "m": 20.0, "mps": 7.0}
+HOPS = 93
 NEW, KEPT = np.array([True]), np.array([False])
 
 
@@ -41,18 +42,28 @@ def test_the_margin_of_going_is_the_time_that_is_missing(situation: Make) -> Non
 
 
 def test_the_forecast_sees_the_gap_behind_a_vehicle_that_passes(situation: Make) -> None:
-    later = Outlook().look(situation([AT_THE_ZONE], [COMING]), NEW).inputs[0, 13:37].reshape(3, 8)
+    later = Outlook().look(situation([AT_THE_ZONE], [COMING]), NEW).inputs[0, 13:53].reshape(5, 8)
     # Half a second on it is 3.5 m nearer; after 3 s it is in the zone, after 3.5 s it has left.
     assert later[0, 0] == pytest.approx((13.5 / 7.0 - THROUGH_S - 0.1) / 4.0, abs=1e-4)
     assert later[0, 5] == pytest.approx((-THROUGH_S - 0.1) / 4.0, abs=1e-4)
     assert later[0, 6:].tolist() == [1.0, 1.0]
 
 
+def test_it_says_which_margins_are_enough(random_situations: Make) -> None:
+    inputs = Outlook().look(random_situations(2, 300), np.ones(300, dtype=np.bool_)).inputs
+    margins, enough = inputs[:, 13:53], inputs[:, 53:HOPS]
+    assert set(np.unique(enough)) == {0.0, 1.0}
+    np.testing.assert_array_equal(enough, margins >= -1e-6 / 4.0)
+
+
 def test_who_creeps_forward_needs_a_shorter_gap_or_is_in_the_way(situation: Make) -> None:
     far = {"id": 3, "ego_m": 13.0}
-    later = Outlook().look(situation([far], [{**COMING, "m": 45.0}]), NEW).inputs[0, 13:37]
-    waiting, creeping, nearing = later.reshape(3, 8)
+    later = Outlook().look(situation([far], [{**COMING, "m": 45.0}]), NEW).inputs[0, 13:53]
+    waiting, creeping, nearing, stopped, slowed = later.reshape(5, 8)
     assert nearing[3] > creeping[3] > waiting[3]
+    # Who comes nearer after a period of Stop is behind; from rest Slow and Fast begin alike.
+    assert slowed[3] == nearing[3] > stopped[3] > waiting[3]
+    assert (stopped[0], slowed[0]) == (waiting[0], creeping[0])
 
 
 def test_it_tells_how_far_the_next_place_to_wait_is(situation: Make) -> None:
@@ -67,22 +78,22 @@ def test_it_tells_how_far_the_next_place_to_wait_is(situation: Make) -> None:
 def test_it_tells_what_hops_can_fill_of_the_way_to_the_next_place(situation: Make) -> None:
     # At rest 0.9 m before the place. Slow takes it 0.1875 m and reaches 0.75 m/s; braking 0.0804 m.
     left_m = 0.9 - (0.1875 + 0.75**2 / 7.0)
-    hops = Outlook().look(situation([{"id": 3, "ego_m": 4.0}]), NEW).inputs[0, 37:]
+    hops = Outlook().look(situation([{"id": 3, "ego_m": 4.0}]), NEW).inputs[0, HOPS:]
     assert hops[1:4].tolist() == pytest.approx([0.3, left_m / 3.0, left_m / 3.0], abs=1e-4)
     # Three hops of 0.27 m from 0.9 m, or one and two more, leave 0.09 m of it.
     assert hops[4:].tolist() == pytest.approx([0.3, 0.3, 0.3], abs=1e-6)
 
 
 def test_nothing_is_crept_to_where_no_place_is_ahead(situation: Make) -> None:
-    hops = Outlook().look(situation(), NEW).inputs[0, 37:]
+    hops = Outlook().look(situation(), NEW).inputs[0, HOPS:]
     assert hops.tolist() == [0.0, -1.0, -1.0, -1.0, 1.0, 1.0, 1.0]
 
 
 def test_it_creeps_where_a_corner_hides_a_lane(situation: Make) -> None:
     hidden = {"id": 3, "ego_m": 4.0, "hidden_m": 12.0}
     seen = {"id": 3, "ego_m": 4.0}
-    assert Outlook().look(situation([hidden]), NEW).inputs[0, 37] == 1.0
-    assert Outlook().look(situation([seen]), NEW).inputs[0, 37] == 0.0
+    assert Outlook().look(situation([hidden]), NEW).inputs[0, HOPS] == 1.0
+    assert Outlook().look(situation([seen]), NEW).inputs[0, HOPS] == 0.0
 
 
 def test_who_comes_nearer_rests_before_the_zone() -> None:
@@ -110,7 +121,7 @@ def test_sound_is_what_the_guard_calls_sound(random_situations: Make) -> None:
 
 def test_all_numbers_are_between_minus_one_and_one(random_situations: Make) -> None:
     inputs = Outlook().look(random_situations(4, 500), np.ones(500, dtype=np.bool_)).inputs
-    assert inputs.shape == (500, OutlookConfig().size) == (500, 44)
+    assert inputs.shape == (500, OutlookConfig().size) == (500, 100)
     assert np.isfinite(inputs).all()
     assert np.abs(inputs).max() <= 1.0
 

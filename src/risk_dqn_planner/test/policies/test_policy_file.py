@@ -240,7 +240,7 @@ def test_an_outlook_comes_back_as_it_was_saved(with_outlook: Path, path: Path) -
         ("outlook_layout", "something else", "outlook_layout is something else"),
         ("outlook", {"periods": 0}, "outlook cannot be used: OutlookConfig.periods is 0"),
         ("outlook", {"colour": 1}, "outlook cannot be used"),
-        ("outlook", {**vars(OUTLOOK), "periods": 4}, "the golden outlook has shape (2, 35)"),
+        ("outlook", {**vars(OUTLOOK), "periods": 4}, "the golden outlook has shape (2, 70)"),
     ],
 )
 def test_an_outlook_that_this_program_cannot_give_is_refused(

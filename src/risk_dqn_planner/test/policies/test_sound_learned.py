@@ -13,7 +13,7 @@ from risk_dqn_planner.errors import PolicyError
 from risk_dqn_planner.policies.base import Action, Reason, Supervision
 from risk_dqn_planner.policies.network import OutlookDqn
 from risk_dqn_planner.policies.outlook import OutlookConfig
-from risk_dqn_planner.policies.sound_learned import SoundLearnedPolicy
+from risk_dqn_planner.policies.sound_learned import SWITCHING_VALUE, SoundLearnedPolicy
 from risk_dqn_planner.safety.assumptions import SafetyAssumptions
 from risk_dqn_planner.safety.guard import Guard
 from risk_dqn_planner.situation.situations import Situations
@@ -62,6 +62,22 @@ def test_where_that_is_not_sound_the_best_sound_one_stands_in_and_it_says_why(
     assert decision.critical_vehicle_id == 8
     # 17 / 7 s less 2.8636 + 0.1 s, see test_joint_check.
     assert decision.explanation.lacking_s == pytest.approx(0.535, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("lead", "expected"),
+    [(SWITCHING_VALUE - 0.01, Action.SLOW), (SWITCHING_VALUE + 0.01, Action.FAST)],
+)
+def test_it_changes_only_for_what_is_worth_a_change(
+    situation: Make, lead: float, expected: Action
+) -> None:
+    s, wants = situation([AT_THE_ZONE]), Wants(-1.0, 0.5, 0.0)
+    driver = SoundLearnedPolicy(wants, "wants", "abc")
+    assert driver.decide(s, NEW).action[0] == Action.SLOW
+    wants.values[Action.FAST] = 0.5 + lead
+    decisions = driver.decide(s, ~NEW)
+    assert decisions.action[0] == expected
+    assert decisions.q_values[0].argmax() == expected
 
 
 def test_it_never_takes_what_is_not_sound(random_situations: Make) -> None:

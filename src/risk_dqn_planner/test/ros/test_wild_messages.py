@@ -31,7 +31,7 @@ from risk_dqn_planner.ros.adapters.kinds import ObjectsAdapter
 from risk_dqn_planner.ros.decider import Decider, DeciderConfig
 from risk_dqn_planner.ros.evaluation import Evaluation
 from risk_dqn_planner.ros.parameters import EgoParameters, MapParameters
-from risk_dqn_planner.ros.situation_records import read_situation
+from risk_dqn_planner.ros.situation_records import SituationRecords, read_situation
 from risk_dqn_planner.ros.synchroniser import Frame
 from risk_dqn_planner.situation.config import SituationConfig
 from risk_dqn_planner.situation.pipeline import SituationPipeline
@@ -156,7 +156,7 @@ def test_whatever_is_perceived_gives_a_sound_situation_or_a_fault_that_is_the_in
         assert not complaints
         if report.status is Status.OK:
             message = conversions.situation_to_message(report)
-            back = over_the_wire(message)
+            back = conversions.situation_from_records(over_the_wire(message))
             assert back.situations is not None
         else:
             assert report.status is not Status.INTERNAL_ERROR
@@ -199,13 +199,13 @@ def situations(draw: st.DrawFn, values: st.SearchStrategy[float]) -> Situation:
     )
 
 
-def over_the_wire(message: Situation) -> SituationReport:
-    return conversions.situation_from_records(read_situation(bytes(serialize_message(message))))
+def over_the_wire(message: Situation) -> SituationRecords:
+    return read_situation(bytes(serialize_message(message)))
 
 
-def read_or_refused(message: Situation) -> SituationReport | InputError:
+def read_or_refused(message: SituationRecords) -> SituationReport | InputError:
     try:
-        return over_the_wire(message)
+        return conversions.situation_from_records(message)
     except InputError as error:
         return error
 
@@ -213,7 +213,7 @@ def read_or_refused(message: Situation) -> SituationReport | InputError:
 @drawn(1000)
 @given(message=situations(number))
 def test_whatever_a_situation_says_it_is_read_or_refused_by_name(message: Situation) -> None:
-    read = read_or_refused(message)
+    read = read_or_refused(over_the_wire(message))
     if isinstance(read, InputError):
         assert read.kind in (Status.MALFORMED_INPUT, Status.NOT_FINITE)
         assert read.source is FaultyInput.SITUATION
@@ -231,10 +231,28 @@ def test_whatever_is_finite_in_a_situation_leads_to_a_decision(
     decider = Decider(loaded, explain, DeciderConfig(recovery_s=0.0))
     for k, message in enumerate(messages):
         now_ns = 500 * MS * k
-        read = read_or_refused(message)
+        read = read_or_refused(over_the_wire(message))
         if isinstance(read, SituationReport):
             decider.receive(read, now_ns)
         choice = decider.decide(now_ns)
         said = conversions.decision_to_message(choice.decision, now_ns, choice.situation_stamp_ns)
         assert conversions.decision_from_message(said).action in set(Action)
         assert math.isfinite(said.target_speed_mps)
+
+
+@drawn(1000)
+@given(message=situations(number), data=st.data())
+def test_a_situation_with_spoilt_bytes_is_read_or_refused(
+    message: Situation, data: st.DataObject
+) -> None:
+    whole = bytearray(serialize_message(message))
+    places = st.integers(0, len(whole) - 1)
+    for place in data.draw(st.lists(places, min_size=1, max_size=8)):
+        whole[place] = data.draw(st.integers(0, 255))
+    try:
+        records = read_situation(bytes(whole))
+    except ValueError:
+        return
+    read = read_or_refused(records)
+    if isinstance(read, SituationReport):
+        assert (read.situations is not None) == (read.status is Status.OK)

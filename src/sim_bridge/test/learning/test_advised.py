@@ -84,6 +84,8 @@ def test_an_exported_policy_drives_as_validation_said(tmp_path: Path) -> None:
     list(one.run())
     path = RunFolder(tmp_path, ADVISED).finish(one, "tiny")
     policy = load_policy(str(path))
+    assert isinstance(policy, SoundLearnedPolicy)
+    policy.switching_value = 0.0  # validation goes by what the network says, and nothing else
     simulation = FOUR_WAY.usual.simulation(load_scenario("dense_traffic"), 5)
     driven = drive(simulation, policy, fixed_seeds(VALIDATION_SEEDS, 5))
     assert one.best is not None
@@ -95,7 +97,7 @@ def test_the_vehicle_decides_as_training_does() -> None:
     weights = initial_weights(3, ADVISED.outlook_size)
     weights[-1] += 1.0  # such as to prefer Fast by far, and be overruled often
     learner = Learner(LearnerConfig(), weights)
-    vehicle = SoundLearnedPolicy(network_of(weights), "fast", "")
+    vehicle = SoundLearnedPolicy(network_of(weights), "fast", "", switching_value=0.0)
     one = environment(16)
     states, begun = one.reset(), np.ones(16, dtype=np.bool_)
     running, overruled = begun, 0

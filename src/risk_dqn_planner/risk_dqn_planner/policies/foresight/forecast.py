@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """How much time there would be if the ego waited for a while and then went (kernels).
 
-In traffic that keeps its speed, for each of the coming decisions, and for three ways to wait: by
-Stop, by Slow, and by going as far as it can still rest before the next zone. Nothing is searched
-and nothing is chosen: the plans are always the same ones, and their margins are numbers for a
-network.
+In traffic that keeps its speed, for each of the coming decisions, and for five ways to wait: by
+Stop, by Slow, by going as far as the ego can still rest before the next zone, and by that after one
+period of Stop or of Slow. Nothing is searched and nothing is chosen: the plans are always the same
+ones, and their margins are numbers for a network.
 """
 
 import math
@@ -21,9 +21,9 @@ from risk_dqn_planner.safety.joint_check import ACTIONS, judge, target_of
 from risk_dqn_planner.situation.situations import Floats
 
 _ROUNDING = 1e-6
-# By Stop, by Slow, by coming nearer.
-WAYS_TO_WAIT = 3
-_COME_NEARER = 2
+# By Stop, by Slow, by coming nearer, and by that after a period of Stop or Slow.
+WAYS_TO_WAIT = 5
+_COME_NEARER, _AFTER_ONE = 2, 3
 
 
 class Place(NamedTuple):
@@ -56,31 +56,57 @@ def next_place(t: Task, w: Work) -> Place:
 
 
 @kernel
-def forecast(t: Task, place: Place, periods: int, w: Work, margin_s: Floats) -> None:
-    """Fill the margins (3, K) of going after k + 1 periods of each way to wait.
+def forecast(t: Task, place: Place, periods: int, w: Work, ego: Floats, margin_s: Floats) -> None:
+    """Fill the margins (5, K) of going after k + 1 periods of each way to wait.
 
-    A margin is the one of the joint check [s], in the situation predicted for then.
+    A margin is the one of the joint check [s], in the situation predicted for then. ego (5, 3):
+    room for where each way to wait has led, how fast, and the speed it headed for.
     """
-    p, now_mps = t.p, max(t.s.ego_speed_mps[t.row], 0.0)
-    near_m, near_mps = 0.0, now_mps
+    p = t.p
+    for wait in range(WAYS_TO_WAIT):
+        ego[wait, 0], ego[wait, 1] = 0.0, max(t.s.ego_speed_mps[t.row], 0.0)
     limit_m = place.free_m if place.rest_m == math.inf else place.rest_m
     for k in range(1, periods + 1):
         predict(t, k, w)
-        time_s = k * p.period_s
         for wait in range(WAYS_TO_WAIT):
-            if wait == _COME_NEARER:
-                target_mps = nearing_speed(near_m, near_mps, limit_m, p)
-                way_m = near_m + travelled(near_mps, target_mps, p.period_s, p)
-                mps = reached(near_mps, target_mps, p.period_s, p)
-                near_m, near_mps = way_m, mps
+            before_m, before_mps = ego[wait, 0], ego[wait, 1]
+            target_mps = waiting_speed(wait, k, before_m, before_mps, limit_m, p)
+            way_m = before_m + travelled(before_mps, target_mps, p.period_s, p)
+            mps = reached(before_mps, target_mps, p.period_s, p)
+            ego[wait, 0], ego[wait, 1], ego[wait, 2] = way_m, mps, target_mps
+            first = first_like(ego, wait)
+            if first == wait:
+                look_from(t, k, way_m, w)
+                course = begin_course(mps, target_mps, p.fast_mps, p)
+                verdict = judge(w.ahead, k, course, w.arrival_s, w.who, w.known, p)
+                margin_s[wait, k - 1] = verdict.margin_s
             else:
-                target_mps = target_of(wait, p)
-                way_m = travelled(now_mps, target_mps, time_s, p)
-                mps = reached(now_mps, target_mps, time_s, p)
-            look_from(t, k, way_m, w)
-            course = begin_course(mps, target_mps, p.fast_mps, p)
-            verdict = judge(w.ahead, k, course, w.arrival_s, w.who, w.known, p)
-            margin_s[wait, k - 1] = verdict.margin_s
+                margin_s[wait, k - 1] = margin_s[first, k - 1]
+
+
+@kernel
+def first_like(ego: Floats, wait: int) -> int:
+    """Return the first way to wait that has led to the same as this one, or this one."""
+    for other in range(wait):
+        if (
+            ego[other, 0] == ego[wait, 0]
+            and ego[other, 1] == ego[wait, 1]
+            and ego[other, 2] == ego[wait, 2]
+        ):
+            return other
+    return wait
+
+
+@kernel
+def waiting_speed(
+    wait: int, period: int, way_m: float, mps: float, limit_m: float, p: SafetyNumbers
+) -> float:
+    """Return the speed that a way to wait heads for in a period, the first of which is 1."""
+    if wait < _COME_NEARER:
+        return target_of(wait, p)
+    if wait >= _AFTER_ONE and period == 1:
+        return target_of(wait - _AFTER_ONE, p)
+    return nearing_speed(way_m, mps, limit_m, p)
 
 
 @kernel

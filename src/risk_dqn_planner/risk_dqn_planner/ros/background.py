@@ -14,8 +14,7 @@ from rclpy.node import Node
 def spinning(node: Node) -> Iterator[Executor]:
     """Run a node's callbacks in a thread of their own; afterwards nobody runs them.
 
-    The caller keeps the main thread, which is the one that a request to end interrupts. A callback
-    that fails is told of, and the others go on.
+    A callback that fails is told of, and the others go on.
     """
     executor = SingleThreadedExecutor(context=node.context)
     executor.add_node(node)

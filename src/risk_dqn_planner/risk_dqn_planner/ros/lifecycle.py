@@ -2,8 +2,8 @@
 """Managed nodes: configured and activated on request, or by themselves for a plain `ros2 run`.
 
 Callbacks, timers and lifecycle services run in a thread of their own. Transitions are carried out
-in the main thread, one after another: there they may take their time, and a request to end the
-process interrupts them.
+in another, one after the other: there they may take their time, and a request to end the process
+need not wait for them.
 """
 
 import queue
@@ -29,7 +29,8 @@ from risk_dqn_planner.ros.settling import settle
 _SUCCESS, _FAILURE = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
 # The answer to a last request is on its way for so long at most.
 _FAREWELL_S = 0.5
-_LOOK_AGAIN_S = 0.2
+# How often a node looks whether it is asked to end.
+LOOK_AGAIN_S = 0.2
 
 
 @dataclass(frozen=True)
@@ -93,15 +94,12 @@ class ManagedNode(LifecycleNodeMixin, Node):
         return str(self._state_machine.current_state[1])
 
     def serve(self, executor: Executor, asked_to_end: Callable[[], bool]) -> None:
-        """Carry out transitions until the last one, `shutdown`, or until interrupted.
-
-        asked_to_end: interruptions may get lost in libraries, so it is asked too.
-        """
+        """Carry out transitions until the last one, `shutdown`, or until asked to end."""
         if self.autostart and self.trigger_configure() == _SUCCESS:
             self.trigger_activate()
         while not asked_to_end():
             with suppress(queue.Empty):
-                self._serve_one(self._requests.get(timeout=_LOOK_AGAIN_S))
+                self._serve_one(self._requests.get(timeout=LOOK_AGAIN_S))
                 executor.wake()
             if self._state_machine.current_state[0] == State.PRIMARY_STATE_FINALIZED:
                 time.sleep(_FAREWELL_S)

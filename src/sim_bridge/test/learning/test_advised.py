@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from risk_dqn_planner.errors import ConfigurationError
+from risk_dqn_planner.policies.base import StopsAtGoal
 from risk_dqn_planner.policies.loading import load_policy
 from risk_dqn_planner.policies.look_ahead import LookAheadConfig, LookAheadPolicy
 from risk_dqn_planner.policies.outlook import Outlook
@@ -84,8 +85,9 @@ def test_an_exported_policy_drives_as_validation_said(tmp_path: Path) -> None:
     list(one.run())
     path = RunFolder(tmp_path, ADVISED).finish(one, "tiny")
     policy = load_policy(str(path))
-    assert isinstance(policy, SoundLearnedPolicy)
-    policy.switching_value = 0.0  # validation goes by what the network says, and nothing else
+    assert isinstance(policy, StopsAtGoal)
+    assert isinstance(policy.policy, SoundLearnedPolicy)
+    policy.policy.switching_value = 0.0  # validation goes by what the network says alone
     simulation = FOUR_WAY.usual.simulation(load_scenario("dense_traffic"), 5)
     driven = drive(simulation, policy, fixed_seeds(VALIDATION_SEEDS, 5))
     assert one.best is not None

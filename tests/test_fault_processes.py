@@ -149,11 +149,16 @@ def test_a_killed_policy_node_says_stop_once_it_is_back_until_it_knows_enough(
     drive: Drive,
 ) -> None:
     drive.begin()
+    # With the situation node it may know enough before it is heard; without, it cannot.
+    drive.nodes.kill("situation_node")
     drive.nodes.kill("policy_node")
     time.sleep(0.2)  # what it said last may be on its way
     since = len(drive.ears.decisions)
     drive.nodes.start("policy_node")
-    drive.await_decision(lambda d: d.reason == Decision.FIXED, "the policy node to be back")
+    nothing_known = Told(Reason.MISSING_INPUT, FaultyInput.SITUATION)
+    drive.await_decision(lambda d: told_by(d) == nothing_known, str(nothing_known))
+    drive.nodes.start("situation_node")
+    drive.await_decision(lambda d: d.reason == Decision.FIXED, "both nodes to be back")
     said = drive.ears.decisions[since:]
     first = next(k for k, d in enumerate(said) if d.reason == Decision.FIXED)
     assert {d.action for d in said[:first]} == {Decision.STOP}

@@ -7,14 +7,14 @@
     forecast | is it enough? | creeping | way left after each action | what of it hops cannot fill
     5 x K    | 5 x K, 0 or 1 | 0 or 1   | 3                          | 3
 
-The margins are the joint check's, if the ego goes on through everything after the action; the
-forecast is that of going after k periods of waiting, in five ways. Which of these margins are
-enough is told besides: hundredths of a second decide that, which a network hardly tells apart.
-The next place is where the ego can wait: the way to the next zone, to the place, through the zones
-behind it, and whether it joins a lane there. Creeping is 1 where the ego will not see enough before
-it stands at that place, so that decimetres matter: then the network has to choose hops that end
-there. The same object serves a batch in training and a batch of one on the vehicle; rows are
-independent.
+The margins are the joint check's, if the ego goes on after the action, through everything or to a
+rest beyond the next place: there is no other way to join a lane behind a leader. The forecast is
+that of going after k periods of waiting, in five ways. Which of these margins are enough is told
+besides: hundredths of a second decide that, which a network hardly tells apart. The next place is
+where the ego can wait: the way to the next zone, to the place, through the zones behind it, and
+whether it joins a lane there. Creeping is 1 where the ego will not see enough before it stands at
+that place, so that decimetres matter: then the network has to choose hops that end there. The same
+object serves a batch in training and a batch of one on the vehicle; rows are independent.
 """
 
 import math
@@ -45,7 +45,7 @@ from risk_dqn_planner.policies.foresight.task import (
 from risk_dqn_planner.safety.assumptions import SafetyAssumptions, SafetyNumbers
 from risk_dqn_planner.safety.course import begin_course
 from risk_dqn_planner.safety.guard import Guard
-from risk_dqn_planner.safety.joint_check import ACTIONS, JointCheck, foresee, judge, target_of
+from risk_dqn_planner.safety.joint_check import ACTIONS, JointCheck, foresee, go_on, target_of
 from risk_dqn_planner.safety.known import Known
 from risk_dqn_planner.situation.situations import Booleans, Floats, Integers, Situations
 
@@ -56,8 +56,8 @@ _ROUNDING = 1e-6
 LAYOUT = (
     "action in force (3), sound (3), margins of going (3), next place (free, rest, zones, joins), "
     "margins of going after k periods of (Stop, Slow, coming nearer, that after a period of Stop, "
-    "of Slow), which of them are enough, creeping, way left after each action (3), "
-    "shortfall after each action (3)"
+    "of Slow), also to a rest beyond that place, which of them are enough, creeping, "
+    "way left after each action (3), shortfall after each action (3)"
 )
 _IN_FORCE, _SOUND, _GOING, _PLACE = 0, ACTIONS, 2 * ACTIONS, 3 * ACTIONS
 _LATER = _PLACE + 4
@@ -191,17 +191,19 @@ def look_into(
     arrival_s, who = np.empty(lanes), np.empty(lanes, dtype=np.int64)
     later_s, ego = np.empty((WAYS_TO_WAIT, periods)), np.empty((WAYS_TO_WAIT, 3))
     for row in range(s.ego_speed_mps.shape[0]):
-        foresee(s, row, known, p, arrival_s, who)
+        last_m, merging = foresee(s, row, known, p, arrival_s, who)
+        t = Task(s, row, p, c, known, corner_m, sound, in_force)
+        place = next_place(t, w)
         now_mps = max(s.ego_speed_mps[row], 0.0)
         before_mps = target_of(in_force[row], p)
         for action in range(ACTIONS):
             course = begin_course(now_mps, before_mps, target_of(action, p), p)
-            going = judge(s, row, course, arrival_s, who, known, p)
+            _, going = go_on(
+                s, row, course, arrival_s, who, known, place.rest_m, last_m, merging, p
+            )
             inputs[row, _IN_FORCE + action] = 1.0 if in_force[row] == action else 0.0
             inputs[row, _SOUND + action] = 1.0 if sound[row, action] else 0.0
             inputs[row, _GOING + action] = share_of(going.margin_s, most_s)
-        t = Task(s, row, p, c, known, corner_m, sound, in_force)
-        place = next_place(t, w)
         tell_place(place, most_m, inputs[row, _PLACE:_LATER])
         forecast(t, place, periods, w, ego, later_s)
         tell_forecast(later_s, most_s, inputs[row, _LATER:])

@@ -173,6 +173,26 @@ def vindicate(
     verdict = judge(s, row, braking, arrival_s, who, known, p)
     if verdict.margin_s >= -_ROUNDING:
         return BRAKE, verdict
+    return go_on(s, row, course, arrival_s, who, known, -math.inf, last_m, merging, p)
+
+
+@kernel
+def go_on(
+    s: Situations,
+    row: int,
+    course: Course,
+    arrival_s: Floats,
+    who: Integers,
+    known: Known,
+    beyond_m: float,
+    last_m: float,
+    merging: bool,
+    p: SafetyNumbers,
+) -> tuple[int, Verdict]:
+    """Return how a course may go on safely, for ever or to a rest beyond a way; -1 for not at all.
+
+    The second is the verdict on it; without one, that of going for ever.
+    """
     going = judge(s, row, course, arrival_s, who, known, p)
     if going.margin_s >= -_ROUNDING:
         return GO, going
@@ -182,9 +202,10 @@ def vindicate(
         stopping = with_manoeuvre(course, periods, p)
         if stopping.rest_m > bound_m + _ROUNDING:
             break
-        verdict = judge(s, row, stopping, arrival_s, who, known, p)
-        if verdict.margin_s >= -_ROUNDING:
-            return periods, verdict
+        if stopping.rest_m > beyond_m + _ROUNDING:
+            verdict = judge(s, row, stopping, arrival_s, who, known, p)
+            if verdict.margin_s >= -_ROUNDING:
+                return periods, verdict
         if stopping.rest_m > last_m:
             break
     return NO_MANOEUVRE, going

@@ -49,6 +49,18 @@ def test_the_forecast_sees_the_gap_behind_a_vehicle_that_passes(situation: Make)
     assert later[0, 6:].tolist() == [1.0, 1.0]
 
 
+@pytest.mark.parametrize(("leader_m", "joins"), [(-12.0, True), (-2.0, False)])
+def test_it_tells_whether_a_lane_can_be_joined_behind_a_leader(
+    situation: Make, leader_m: float, joins: bool
+) -> None:
+    # At rest 0.2 m before a lane in which somebody stands: going on for ever never is safe.
+    lane = {"id": 3, "ego_m": 3.2, "merging": True}
+    leader = {"id": 7, "lane": 3, "m": leader_m, "mps": 0.0}
+    told = Outlook().look(situation([lane], [leader], goal_m=30.0), NEW).inputs[0]
+    assert (told[6 + Action.FAST] >= 0.0) == joins
+    assert (told[53:93] == float(joins)).all()
+
+
 def test_it_says_which_margins_are_enough(random_situations: Make) -> None:
     inputs = Outlook().look(random_situations(2, 300), np.ones(300, dtype=np.bool_)).inputs
     margins, enough = inputs[:, 13:53], inputs[:, 53:HOPS]

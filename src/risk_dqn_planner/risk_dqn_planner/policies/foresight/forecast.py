@@ -17,7 +17,7 @@ from risk_dqn_planner.policies.foresight.waiting import decimetres_matter, find_
 from risk_dqn_planner.risk.motion import distance_after, speed_after
 from risk_dqn_planner.safety.assumptions import SafetyNumbers
 from risk_dqn_planner.safety.course import begin_course
-from risk_dqn_planner.safety.joint_check import ACTIONS, judge, target_of
+from risk_dqn_planner.safety.joint_check import ACTIONS, go_on, target_of
 from risk_dqn_planner.situation.situations import Floats
 
 _ROUNDING = 1e-6
@@ -59,15 +59,16 @@ def next_place(t: Task, w: Work) -> Place:
 def forecast(t: Task, place: Place, periods: int, w: Work, ego: Floats, margin_s: Floats) -> None:
     """Fill the margins (5, K) of going after k + 1 periods of each way to wait.
 
-    A margin is the one of the joint check [s], in the situation predicted for then. ego (5, 3):
-    room for where each way to wait has led, how fast, and the speed it headed for.
+    A margin is the one of the joint check [s], in the situation predicted for then, of going
+    through everything or to a rest beyond the place. ego (5, 3): room for where each way to wait
+    has led, how fast, and the speed it headed for.
     """
     p = t.p
     for wait in range(WAYS_TO_WAIT):
         ego[wait, 0], ego[wait, 1] = 0.0, max(t.s.ego_speed_mps[t.row], 0.0)
     limit_m = place.free_m if place.rest_m == math.inf else place.rest_m
     for k in range(1, periods + 1):
-        predict(t, k, w)
+        last_m, merging = predict(t, k, w)
         for wait in range(WAYS_TO_WAIT):
             before_m, before_mps = ego[wait, 0], ego[wait, 1]
             target_mps = waiting_speed(wait, k, before_m, before_mps, limit_m, p)
@@ -78,7 +79,18 @@ def forecast(t: Task, place: Place, periods: int, w: Work, ego: Floats, margin_s
             if first == wait:
                 look_from(t, k, way_m, w)
                 course = begin_course(mps, target_mps, p.fast_mps, p)
-                verdict = judge(w.ahead, k, course, w.arrival_s, w.who, w.known, p)
+                _, verdict = go_on(
+                    w.ahead,
+                    k,
+                    course,
+                    w.arrival_s,
+                    w.who,
+                    w.known,
+                    place.rest_m - way_m,
+                    last_m - way_m,
+                    merging,
+                    p,
+                )
                 margin_s[wait, k - 1] = verdict.margin_s
             else:
                 margin_s[wait, k - 1] = margin_s[first, k - 1]

@@ -201,12 +201,16 @@ def _soundness(arguments: argparse.Namespace, console: Console) -> None:
         )
     }
     episodes = EPISODES if arguments.episodes is None else arguments.episodes
+    route, origin = route_and_origin(arguments.route, arguments.origin)
     plan = Plan(
         arguments.output,
         episodes,
         arguments.search_episodes,
         arguments.limit_episodes,
         arguments.sound_episodes,
+        route=route,
+        origin=origin,
+        projector=arguments.projector,
         **chosen,
     )
     # Matplotlib takes a second to load, too long for --help.

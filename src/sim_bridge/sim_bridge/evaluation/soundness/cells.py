@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The set `soundness`: where no collision may happen, what accepted risk buys, what breaks it."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import product
 
 from risk_dqn_planner.safety.assumptions import NO_CAP_MPS, SafetyAssumptions
 from risk_dqn_planner.situation.config import TRACKED
@@ -36,7 +37,7 @@ VIOLATIONS = (
     "others_over_the_limit", "weak_brakes", "delay_200ms", "delay_500ms", "missed_detections",
     "phantom_detections", "velocity_bias",
 )  # fmt: skip
-VIOLATED_ON = ("four_way", "roundabout")
+FRONTIER_ON, VIOLATED_ON = "four_way", ("four_way", "roundabout")
 # Errors of perceived speeds have no bound; 1 of 16 000 lies outside of so many deviations.
 NOISE_DEVIATIONS = 4.0
 
@@ -65,9 +66,15 @@ def assumptions_for(cell: Cell) -> SafetyAssumptions:
     return SafetyAssumptions(speed_error_mps=NOISE_DEVIATIONS * noise_mps, period_error_s=0.0)
 
 
-def soundness_cells() -> list[SoundnessCell]:
-    """Return all cells whose scenarios there are."""
-    return [*_goal(), *_memory(), *_frontier(), *_violated()]
+def soundness_cells(maps: Sequence[str] = MAPS) -> list[SoundnessCell]:
+    """Return all cells on these maps whose scenarios there are.
+
+    maps: names, or .osm files, which have every part of the set; of the project's own maps the
+    last two parts take some only.
+    """
+    frontier = [each for each in maps if each == FRONTIER_ON or each not in MAPS]
+    violated = [each for each in maps if each in VIOLATED_ON or each not in MAPS]
+    return [*_goal(maps), *_memory(maps), *_frontier(frontier), *_violated(violated)]
 
 
 def missing_scenarios() -> list[str]:
@@ -79,18 +86,18 @@ def _traffic(scenario: str) -> str:
     return RESPAWNING if load_scenario(scenario).traffic.respawn else FINITE
 
 
-def _goal() -> Iterator[SoundnessCell]:
-    for map_name in MAPS:
+def _goal(maps: Sequence[str]) -> Iterator[SoundnessCell]:
+    for map_name in maps:
         for scenario in SCENARIOS:
             for forward_m in SENSORS_M:
                 cell = Cell(scenario, _traffic(scenario), sensor_forward_m=forward_m)
                 yield SoundnessCell(GOAL, map_name, cell, assumptions_for(cell), limits=True)
 
 
-def _memory() -> Iterator[SoundnessCell]:
+def _memory(maps: Sequence[str]) -> Iterator[SoundnessCell]:
     """Where something stands close, and the ego has seen behind it before."""
     policies = (FASTEST_SOUND, LOOK_AHEAD)
-    for map_name in MAPS:
+    for map_name in maps:
         for scenario in (CLOSE, OCCLUDED):
             for forward_m in SENSORS_M:
                 cell = Cell(
@@ -99,20 +106,20 @@ def _memory() -> Iterator[SoundnessCell]:
                 yield SoundnessCell(MEMORY, map_name, cell, policies=policies, limits=True)
 
 
-def _frontier() -> Iterator[SoundnessCell]:
+def _frontier(maps: Sequence[str]) -> Iterator[SoundnessCell]:
     """Where the worst case forbids most; a hidden vehicle that is slower than the truth is risk."""
     policies = (FASTEST_SOUND, LOOK_AHEAD, SOUND_DQN)
-    for after_s in BRAKES_AFTER_S:
+    for map_name, after_s in product(maps, BRAKES_AFTER_S):
         cell = Cell(OCCLUDED, RESPAWNING, sensor_forward_m=0.0, brakes_for_ego_after_s=after_s)
         for top_mps in HIDDEN_TOP_MPS:
             own = SafetyAssumptions(hidden_top_speed_mps=top_mps)
             holds = top_mps == NO_CAP_MPS
-            yield SoundnessCell(FRONTIER, MAPS[0], cell, own, policies, holds, limits=holds)
+            yield SoundnessCell(FRONTIER, map_name, cell, own, policies, holds, limits=holds)
 
 
-def _violated() -> Iterator[SoundnessCell]:
+def _violated(maps: Sequence[str]) -> Iterator[SoundnessCell]:
     """Worlds that break one assumption each, and base, which keeps them all."""
-    for map_name in VIOLATED_ON:
+    for map_name in maps:
         for scenario in (BASE, *(each for each in VIOLATIONS if each in scenario_names())):
             cell = Cell(scenario, _traffic(scenario), sensor_forward_m=0.0)
             yield SoundnessCell(VIOLATED, map_name, cell, holds=scenario == BASE)

@@ -9,6 +9,7 @@ from typing import Any
 from rich.console import Console
 
 from risk_dqn_planner.errors import ConfigurationError, UnknownPolicyError
+from risk_dqn_planner.map.loader import DEFAULT_PROJECTOR, MapOrigin
 from risk_dqn_planner.safety.assumptions import SafetyAssumptions
 from sim_bridge.environment.place import Places
 from sim_bridge.evaluation.campaign import Campaign, versions
@@ -16,6 +17,7 @@ from sim_bridge.evaluation.progress import progress_on
 from sim_bridge.evaluation.rollout import Clairvoyant, Contestant
 from sim_bridge.evaluation.soundness.cells import (
     GOAL,
+    MAPS,
     SEARCHING,
     UNAIDED,
     SoundnessCell,
@@ -41,7 +43,9 @@ class Plan:
     the first ones of those, for the limits. sound_episodes: for all others that take sound actions
     by themselves, in the cells where these may not collide; None for as many as elsewhere.
 
-    maps, scenarios, policies: only these; empty for all. output: folder of finished cells.
+    maps: names of own maps, or one .osm file; empty for all own ones. route, origin, projector: of
+    a single map, as in `load_place`. scenarios, policies: only these; empty for all.
+    output: folder of finished cells.
     """
 
     output: Path
@@ -50,6 +54,9 @@ class Plan:
     limit_episodes: int = LIMIT_EPISODES
     sound_episodes: int | None = None
     maps: tuple[str, ...] = ()
+    route: tuple[int, ...] | None = None
+    origin: MapOrigin | None = None
+    projector: str = DEFAULT_PROJECTOR
     scenarios: tuple[str, ...] = ()
     policies: tuple[str, ...] = ()
 
@@ -58,6 +65,9 @@ class Plan:
             count = getattr(self, name)
             if count is not None and count < 1:
                 raise ConfigurationError(f"{name} is {count}, expected 1 or more")
+        if (self.route or self.origin) and len(self.maps) != 1:
+            named = ", ".join(self.maps or MAPS)
+            raise ConfigurationError(f"route and origin belong to one map, but there are {named}")
 
     def cells(self) -> list[SoundnessCell]:
         """Return the cells to be driven, each with its policies.
@@ -67,13 +77,20 @@ class Plan:
         """
         chosen = [
             replace(cell, policies=tuple(p for p in cell.policies if self._takes(p)))
-            for cell in soundness_cells()
-            if (not self.maps or cell.map_name in self.maps)
-            and (not self.scenarios or cell.cell.scenario in self.scenarios)
+            for cell in soundness_cells(self.maps or MAPS)
+            if not self.scenarios or cell.cell.scenario in self.scenarios
         ]
         if not any(cell.policies for cell in chosen):
             raise ConfigurationError("no cell of the set is left by maps, scenarios and policies")
         return chosen
+
+    def places(self, map_name: str) -> Places:
+        """Return where one of the maps has its episodes.
+
+        Raises:
+            ConfigurationError, MapError, RouteError: as `load_place`.
+        """
+        return Places.named(map_name, self.route, self.origin, self.projector)
 
     def episodes_of(self, policy: str, cell: SoundnessCell) -> int:
         """Return how many episodes of a cell a policy drives."""
@@ -104,7 +121,7 @@ class _Work:
     def campaign(self, cell: SoundnessCell, episodes: int) -> Campaign:
         """Return what drives so many episodes in a cell; the first are held against the limits."""
         if cell.map_name not in self.places:
-            self.places[cell.map_name] = Places.named(cell.map_name)
+            self.places[cell.map_name] = self.plan.places(cell.map_name)
         store = Store(self.plan.output / "cells")
         places, first = self.places[cell.map_name], self.plan.limited
         return Campaign(places, episodes, store, first, cell.assumptions)

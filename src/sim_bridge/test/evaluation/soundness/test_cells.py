@@ -66,6 +66,14 @@ def test_a_broken_assumption_is_never_held_against_a_policy() -> None:
     assert len({each.cell.scenario for each in broken}) == 1 + 7
 
 
+def test_a_map_that_is_none_of_the_project_s_own_has_every_part() -> None:
+    cells = soundness_cells(["town.osm"])
+    assert {each.map_name for each in cells} == {"town.osm"}
+    assert len(cells) == 7 * 2 + 2 * 2 + 8 * 2 + 1 + 7
+    some = soundness_cells(["t_junction"])
+    assert {each.part for each in some} == {GOAL, MEMORY}
+
+
 def test_contestants_take_over_the_cell_s_assumptions() -> None:
     drivers, careful = Drivers(), SafetyAssumptions(speed_error_mps=4.0)
     for name in ("fastest_sound", "look_ahead", "rule_based+supervisor"):

@@ -11,6 +11,7 @@ from sim_bridge.evaluation.soundness.beam import BeamConfig
 from sim_bridge.evaluation.soundness.cells import soundness_cells
 from sim_bridge.evaluation.soundness.evaluate import Plan
 from sim_bridge.evaluation.soundness.reporting.tables import at_a_glance, cells_reached, outcome
+from sim_bridge.maps import shipped_map
 
 OPTIONS = [
     "--set", "soundness", "--episodes", "6", "--limit-episodes", "2", "--map", "four_way",
@@ -98,6 +99,34 @@ def test_a_choice_that_leaves_nothing_is_said(
     more = ["--output", str(tmp_path), "--scenarios", "nowhere"]
     assert evaluate.main(["--set", "soundness", *more]) == 2
     assert "no cell of the set is left" in capsys.readouterr().err
+
+
+def test_a_map_file_has_every_part_and_the_figures_of_the_own_map_it_is(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    own, town = shipped_map("four_way"), tmp_path / "town.osm"
+    town.write_bytes(own.path.read_bytes())
+    where = ["--map", str(town), "--route", ",".join(map(str, own.route))]
+    where += ["--origin", f"{own.origin.latitude_deg},{own.origin.longitude_deg}"]
+    monkeypatch.setattr(BeamConfig, "__init__", _narrow)
+    lines = run(tmp_path, *where)["cells"]
+    assert {line.pop("map") for line in lines} == {str(town)}
+    expected = json.loads((folder / "results.json").read_text())["cells"]
+    assert {line.pop("map") for line in expected} == {"four_way"}
+    assert lines == expected
+
+
+def test_a_route_for_several_maps_and_an_unknown_map_are_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    more = ["--set", "soundness", "--output", str(tmp_path), "--episodes", "1"]
+    for chosen in (["--route", "1,2"], ["--origin", "49,8", "--map", "four_way,roundabout"]):
+        assert evaluate.main([*more, *chosen]) == 2
+        assert "belong to one map" in capsys.readouterr().err
+    assert evaluate.main([*more, "--map", "atlantis"]) == 2
+    assert "atlantis" in capsys.readouterr().err
+    assert evaluate.main([*more, "--map", "town.osm"]) == 2
+    assert "its route must be given" in capsys.readouterr().err
 
 
 def test_policies_that_search_drive_fewer_episodes_but_all_whose_limits_are_searched() -> None:

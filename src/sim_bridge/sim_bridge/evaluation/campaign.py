@@ -19,6 +19,7 @@ from sim_bridge.evaluation.rollout import Clairvoyant, Contestant, joined, roll_
 from sim_bridge.evaluation.store import Store, sources_fingerprint
 from sim_bridge.evaluation.summary import summarise, summarise_first
 from sim_bridge.learning.checkpoint import git_revision
+from sim_bridge.world.entries import entries_in_range
 
 # Batches are no larger than memory and the wish to interrupt allow; results do not depend on it.
 BATCH = 500
@@ -116,6 +117,19 @@ def has_optimum(driver: Contestant, places: Places, cell: Cell) -> str:
     except ScenarioError as error:
         return str(error)
     return ""
+
+
+def entries_in_sight(places: Places, cell: Cell) -> dict[str, dict[str, float]]:
+    """Return `entries_in_range` of a cell [m], by map and lane; nothing where there are none.
+
+    Raises:
+        ScenarioError: the cell cannot be laid out here.
+    """
+    scenario = cell.load()
+    place = places.of(scenario)
+    found = entries_in_range(place.simulation(scenario, 1).world)
+    lanes = {str(lane): round(way_m, 1) for lane, way_m in sorted(found.items())}
+    return {place.map_name: lanes} if lanes else {}
 
 
 def versions(place: Place, drivers: Sequence[Contestant]) -> dict[str, Any]:

@@ -20,10 +20,16 @@ from rich.table import Table
 from risk_dqn_planner.errors import ConfigurationError, PlannerError
 from risk_dqn_planner.policies.shipped import shipped_policies
 from sim_bridge.environment.place import Places
-from sim_bridge.evaluation.campaign import Campaign, has_optimum, versions
+from sim_bridge.evaluation.campaign import (
+    Campaign,
+    entries_in_sight,
+    has_optimum,
+    versions,
+)
 from sim_bridge.evaluation.cells import Cell, cells_of, paper_cells
 from sim_bridge.evaluation.contestants import DEFAULT_POLICIES, contestants, named_policies
 from sim_bridge.evaluation.progress import progress_on
+from sim_bridge.evaluation.reporting.markdown import entries_told
 from sim_bridge.evaluation.rollout import Contestant
 from sim_bridge.evaluation.soundness.cells import MAPS, POLICIES, UNAIDED
 from sim_bridge.evaluation.soundness.evaluate import (
@@ -185,9 +191,12 @@ def _paper(arguments: argparse.Namespace, console: Console) -> None:
     results: list[dict[str, Any]] = []
     campaign = Campaign(places, episodes, Store(arguments.output / "cells"))
     with writing_to(arguments.output):
+        head = versions(places.usual, drivers)
+        head["entries_in_sight_m"] = entries_in_sight(places, cells[0])
         _run(campaign, drivers, cells, console, results)
-        _write(arguments.output, versions(places.usual, drivers), results)
+        _write(arguments.output, head, results)
         _draw(arguments, console)
+    console.print(entries_told(head), end="")
     console.print(_overview(results))
 
 
@@ -222,6 +231,7 @@ def _soundness(arguments: argparse.Namespace, console: Console) -> None:
         content = json.loads((arguments.output / RESULTS).read_text(encoding="utf-8"))
         for path in write_soundness(content, arguments.output, arguments.report):
             console.print(f"{path}")
+    console.print(entries_told(head), end="")
 
 
 def _draw(arguments: argparse.Namespace, console: Console) -> None:

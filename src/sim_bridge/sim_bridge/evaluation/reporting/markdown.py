@@ -2,6 +2,7 @@
 """Pieces of Markdown: tables, and numbers with their intervals."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any
 
 from sim_bridge.evaluation.reporting.selection import Line, Spread, reader, spread
 
@@ -21,11 +22,25 @@ def text_table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     return "\n".join(f"| {' | '.join(line)} |" for line in lines) + "\n"
 
 
-def versions_table(versions: Mapping[str, object]) -> str:
+def versions_table(versions: Mapping[str, Any]) -> str:
     """Return the chapter that says what the results of a page were made with."""
     shown = ("git_revision", "python", "numpy", "numba", "map", "first_seed")
     rows = [[name, str(versions[name])] for name in shown if name in versions]
-    return f"## Made with\n\n{table(['what', 'version'], rows)}"
+    parts = [f"## Made with\n\n{table(['what', 'version'], rows)}", entries_told(versions)]
+    return "\n".join(part for part in parts if part)
+
+
+def entries_told(versions: Mapping[str, Any]) -> str:
+    """Return where vehicles enter in sight of the ego, and what that means; empty for nowhere."""
+    sentences = []
+    for map_name, lanes in versions.get("entries_in_sight_m", {}).items():
+        where = ", ".join(f"{lane} ({way_m:g} m before its zone)" for lane, way_m in lanes.items())
+        sentences.append(
+            f"On {map_name} the map begins within the sensor's range on lanes {where}. Nobody "
+            "enters there while the ego sees that place, so that traffic is thinner than the "
+            "scenarios say for an ego that stands where it sees far.\n"
+        )
+    return "\n".join(sentences)
 
 
 def folded(title: str, text: str) -> str:

@@ -12,7 +12,7 @@ from risk_dqn_planner.errors import ConfigurationError, UnknownPolicyError
 from risk_dqn_planner.map.loader import DEFAULT_PROJECTOR, MapOrigin
 from risk_dqn_planner.safety.assumptions import SafetyAssumptions
 from sim_bridge.environment.place import Places
-from sim_bridge.evaluation.campaign import Campaign, versions
+from sim_bridge.evaluation.campaign import Campaign, entries_in_sight, versions
 from sim_bridge.evaluation.progress import progress_on
 from sim_bridge.evaluation.rollout import Clairvoyant, Contestant
 from sim_bridge.evaluation.soundness.cells import (
@@ -162,6 +162,10 @@ def _head(work: _Work, cells: Sequence[SoundnessCell]) -> dict[str, Any]:
     head["map"] = ",".join(maps)
     head["policies"] = list(dict.fromkeys(name for cell in cells for name in cell.policies))
     head["missing"] = missing_scenarios()
+    first = [next(cell for cell in cells if cell.map_name == name) for name in maps]
+    head["entries_in_sight_m"] = {}
+    for cell in first:
+        head["entries_in_sight_m"] |= entries_in_sight(work.places[cell.map_name], cell.cell)
     return head
 
 

@@ -7,6 +7,7 @@ import pytest
 
 from risk_dqn_planner.errors import ConfigurationError
 from sim_bridge.evaluation import campaign, evaluate
+from sim_bridge.evaluation.reporting.markdown import entries_told
 from sim_bridge.evaluation.soundness.beam import BeamConfig
 from sim_bridge.evaluation.soundness.cells import soundness_cells
 from sim_bridge.evaluation.soundness.evaluate import Plan
@@ -114,6 +115,13 @@ def test_a_map_file_has_every_part_and_the_figures_of_the_own_map_it_is(
     expected = json.loads((folder / "results.json").read_text())["cells"]
     assert {line.pop("map") for line in expected} == {"four_way"}
     assert lines == expected
+
+
+def test_where_the_map_begins_in_sight_page_and_results_say_so() -> None:
+    told = entries_told({"entries_in_sight_m": {"town.osm": {"7": 42.0, "9": 60.5}}})
+    assert "town.osm" in told
+    assert "lanes 7 (42 m before its zone), 9 (60.5 m before its zone)" in told
+    assert entries_told({"entries_in_sight_m": {}}) == entries_told({}) == ""
 
 
 def test_a_route_for_several_maps_and_an_unknown_map_are_refused(

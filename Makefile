@@ -40,6 +40,9 @@ TUNED := --preset tuned --reward collision --steps 3000000 --name tuned \
 SOUND_DQN := --preset advised --reward progress --steps 2000000 --supervisor enforce \
   --name sound_dqn --map four_way,t_junction,multi_lane,roundabout \
   --scenario base,dense_traffic,severe_occlusion,close_small_obstacle,short_sensor_range
+# What docs/ablation.md shows: half an hour on one core.
+ABLATION := --steps 200000 --map four_way,t_junction,multi_lane,roundabout \
+  --scenario base,dense_traffic --episodes 500
 
 .PHONY: help setup demo test replay bags convert maps train trainings evaluate ship bench soak timing shell format lint types check clean distclean
 
@@ -53,6 +56,8 @@ setup: ## set up ROS, Python and the built packages, and run nothing
 demo: ## drive episodes over DDS [MAP ROUTE ORIGIN PROJECTOR POLICY SCENARIO EPISODES SEED RATE OUT]
 	@$(WITH_ROS) $(SIMULATION)/demo $(RUN_OPTIONS) $(ARGS)
 
+# Networks in tests that run side by side must not wait for each other's cores.
+test: export OMP_NUM_THREADS ?= 1
 test: ## run all tests, those with real nodes too [ARGS='-k name']
 	@$(WITH_ROS) python -m pytest $(SIDE_BY_SIDE) $(ARGS)
 
@@ -87,6 +92,10 @@ trainings: ## train all policies of the evaluation, one after another [SEEDS='0 
 	  $(SIMULATION)/train $(COLLISION_AWARE_PAPER) --seed $$seed || exit; \
 	  $(SIMULATION)/train $(TUNED) --seed $$seed || exit; \
 	  $(SIMULATION)/train $(SOUND_DQN) --seed $$seed || exit; done'
+
+.PHONY: ablation
+ablation: ## train with one thing changed at a time, and write docs/ablation.md [ARGS='--seeds 0']
+	@$(WITH_ROS) python -m sim_bridge.learning.ablation $(ABLATION) --report docs/ablation.md $(ARGS)
 
 evaluate: ## drive policies through all cells [SET=soundness EPISODES POLICIES SCENARIOS MAP ROUTE ORIGIN PROJECTOR REPORT]
 	@$(WITH_ROS) $(SIMULATION)/evaluate $(call option,--set,SET) $(call option,--episodes,EPISODES) \

@@ -43,6 +43,7 @@ from sim_bridge.evaluation.store import Store, write_whole
 from sim_bridge.evaluation.training_runs import RUN_FOLDERS, named_runs, training_runs
 from sim_bridge.folders import writing_to
 from sim_bridge.maps import add_map_file_options, map_names, route_and_origin
+from sim_bridge.threads import compute_on_one_thread
 
 RESULTS = "results.json"
 INTERRUPTED = 130
@@ -160,6 +161,7 @@ def _overview(results: list[dict[str, Any]]) -> Table:
 def main(argv: Sequence[str] | None = None) -> int:
     """Evaluate as the command line says."""
     arguments = _arguments(argv)
+    compute_on_one_thread()
     if arguments.output is None:
         arguments.output = _FOLDERS[arguments.set]
     console = Console()

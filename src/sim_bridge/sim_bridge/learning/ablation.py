@@ -31,6 +31,7 @@ from sim_bridge.learning.run import Run
 from sim_bridge.learning.session import Score, Session
 from sim_bridge.learning.variants import MEANING, VARIANTS, Change
 from sim_bridge.scenarios.loading import load_scenario
+from sim_bridge.threads import compute_on_one_thread
 
 INTERRUPTED = 130
 SCENARIOS = "base,dense_traffic,severe_occlusion,close_small_obstacle"
@@ -92,7 +93,7 @@ def page_of(results: Mapping[str, Sequence[Figures]], reference: Run, episodes: 
     return "\n".join(
         [
             "# What works under the supervisor\n",
-            "<!-- Written by `python -m sim_bridge.learning.ablation --report`; do not edit. -->\n",
+            "<!-- Written by `make ablation`; do not edit. -->\n",
             about,
             *meanings,
             "\n## All cells\n",
@@ -210,6 +211,7 @@ def _compare(arguments: argparse.Namespace) -> None:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Compare the variants as the command line says."""
+    compute_on_one_thread()
     try:
         _compare(_arguments(argv))
     except PlannerError as error:

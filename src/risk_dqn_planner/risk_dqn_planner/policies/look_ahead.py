@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The sound action whose best continuation gets to the goal first (ours, SPEC 4).
+"""The sound action whose best continuation gets to the goal first (ours).
 
 The fastest sound action runs up to the conflict zone and waits there; from rest it then needs
 longer gaps than it would at speed. This one looks a few seconds ahead, in traffic that keeps its
@@ -12,7 +12,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from risk_dqn_planner.errors import ConfigurationError
 from risk_dqn_planner.policies.base import Action, Decisions
 from risk_dqn_planner.policies.fastest_sound import assumptions_of, sound_decisions, what_forbids
 from risk_dqn_planner.policies.fingerprint import fingerprint
@@ -23,6 +22,7 @@ from risk_dqn_planner.policies.rule_based import RuleBasedConfig
 from risk_dqn_planner.safety.assumptions import SafetyAssumptions
 from risk_dqn_planner.safety.guard import Guard
 from risk_dqn_planner.situation.situations import Booleans, Situations
+from risk_dqn_planner.vehicle import require_in_range
 
 
 @dataclass(frozen=True)
@@ -88,28 +88,7 @@ class LookAheadConfig:
     )  # fmt: skip
 
     def __post_init__(self) -> None:
-        for name in ("decisions", "fine_cells"):
-            if getattr(self, name) < 1:
-                raise ConfigurationError(
-                    f"LookAheadConfig.{name} is {getattr(self, name)}, expected 1 or more"
-                )
-        for name in ("cell_m", "cell_mps"):
-            if not getattr(self, name) > 0.0:
-                raise ConfigurationError(
-                    f"LookAheadConfig.{name} is {getattr(self, name)}, expected a number above 0"
-                )
-        for name in (
-            "switching_price_s",
-            "gap_price",
-            "chance_price_s",
-            "haste",
-            "creeping_price_s_per_m",
-            "nearest_corner_m",
-        ):
-            if not getattr(self, name) >= 0.0:
-                raise ConfigurationError(
-                    f"LookAheadConfig.{name} is {getattr(self, name)}, expected 0 or more"
-                )
+        require_in_range(self)
 
     def numbers(self) -> SearchNumbers:
         """Return the numbers that kernels read."""

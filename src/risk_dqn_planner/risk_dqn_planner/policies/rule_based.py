@@ -2,6 +2,7 @@
 """Algorithm 1 of the paper: the fastest action that stays safe for a while."""
 
 import dataclasses
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -29,7 +30,7 @@ class RuleBasedConfig:
             raise ConfigurationError(
                 f"RuleBasedConfig.prediction_steps is {self.prediction_steps}, expected 1 or more"
             )
-        if not self.decision_period_s > 0.0:
+        if not 0.0 < self.decision_period_s < math.inf:
             raise ConfigurationError(
                 f"RuleBasedConfig.decision_period_s is {self.decision_period_s}, "
                 "expected a number above 0"

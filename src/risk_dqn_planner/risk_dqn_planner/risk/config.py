@@ -1,11 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Thresholds and limits of the risk measure (paper, section "Risk Reward"; SPEC 3)."""
+"""Thresholds and limits of the risk measure (paper, section "Risk Reward"; docs/paper.md)."""
 
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from risk_dqn_planner.errors import ConfigurationError
-from risk_dqn_planner.vehicle import EgoLimits, TrafficLimits, VehicleDimensions
+from risk_dqn_planner.vehicle import (
+    EgoLimits,
+    TrafficLimits,
+    VehicleDimensions,
+    require_in_range,
+)
 
 
 class RiskParameters(NamedTuple):
@@ -50,6 +55,7 @@ class RiskConfig:
             value = getattr(self, name)
             if not value >= 0.0:
                 raise ConfigurationError(f"RiskConfig.{name} is {value}, expected 0 or more")
+        require_in_range(self)
         if not self.desired_gap_s > self.safe_gap_s:
             raise ConfigurationError(
                 f"RiskConfig.desired_gap_s is {self.desired_gap_s}, expected more than "

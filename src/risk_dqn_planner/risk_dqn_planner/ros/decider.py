@@ -18,7 +18,7 @@ from risk_dqn_planner.policies.base import Decisions, Policy
 from risk_dqn_planner.ros.streams import SECOND_NS, AgeLimits, Stream
 from risk_dqn_planner.situation.report import Fault, SituationReport, Status
 from risk_dqn_planner.situation.situations import Situations
-from risk_dqn_planner.vehicle import require_positive
+from risk_dqn_planner.vehicle import require_in_range
 
 Explain = Callable[[Decisions, Situations, int, Policy], Decision]
 
@@ -83,7 +83,7 @@ class DeciderConfig:
     )
 
     def __post_init__(self) -> None:
-        require_positive(self, skip=("max_situation_ahead_s", "max_repeat_s", "recovery_s"))
+        require_in_range(self)
 
     @property
     def ages(self) -> AgeLimits:

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 from risk_dqn_planner.errors import ConfigurationError
 from risk_dqn_planner.situation.report import Fault, FaultyInput, Status
-from risk_dqn_planner.vehicle import require_positive
+from risk_dqn_planner.vehicle import require_in_range
 
 SECOND_NS = 1_000_000_000
 RATES = "rates."  # of parameters
@@ -46,7 +46,7 @@ class AgeLimits:
     )
 
     def __post_init__(self) -> None:
-        require_positive(self, skip=("max_input_ahead_s",))
+        require_in_range(self)
 
     @property
     def max_age_ns(self) -> int:

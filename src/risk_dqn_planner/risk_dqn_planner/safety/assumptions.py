@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the joint check takes for granted of the ego and of all others (SPEC 4; docs/safety.md).
+"""What the joint check takes for granted of the ego and of all others (docs/safety.md).
 
 In a world that keeps these assumptions an ego that follows the check cannot collide. The
 metadata describe each field where it becomes a parameter of a node.
@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from risk_dqn_planner.errors import ConfigurationError
-from risk_dqn_planner.vehicle import EgoLimits, TrafficLimits, VehicleDimensions, require_positive
+from risk_dqn_planner.vehicle import EgoLimits, TrafficLimits, VehicleDimensions, require_in_range
 
 # A hidden vehicle's own cap; no lane allows more, so that the lane's limit holds.
 NO_CAP_MPS = 100.0
@@ -132,23 +132,14 @@ class SafetyAssumptions:
     vehicle: VehicleDimensions = field(default_factory=VehicleDimensions)
 
     def __post_init__(self) -> None:
-        for name in ("decision_period_s", "speed_limit_factor", "follower_braking_mps2"):
-            _require(self, name, getattr(self, name) > 0.0, "a number above 0")
-        for name in (
-            "actuation_delay_s", "hidden_top_speed_mps", "safe_gap_s", "zone_margin_m",
-            "clearance_m", "follower_reaction_s", "follower_gap_m", "speed_error_mps",
-            "position_error_m", "period_error_s",
-        ):  # fmt: skip
-            _require(self, name, getattr(self, name) >= 0.0, "0 or more")
-        require_positive(self.ego)
+        require_in_range(self)
         least_mps2 = self.ego.braking_mps2
-        _require(
-            self,
-            "leader_braking_mps2",
-            self.leader_braking_mps2 >= least_mps2,
-            f"at least the ego's braking ({least_mps2:g}): a leader that stops more gently than "
-            "the ego would be nearest in between, which the check does not look at",
-        )
+        if self.leader_braking_mps2 < least_mps2:
+            raise ConfigurationError(
+                f"SafetyAssumptions.leader_braking_mps2 is {self.leader_braking_mps2}, expected at "
+                f"least the ego's braking ({least_mps2:g}): a leader that stops more gently than "
+                "the ego would be nearest in between, which the check does not look at"
+            )
 
     def numbers(self) -> SafetyNumbers:
         """Return the numbers that kernels read."""
@@ -173,12 +164,4 @@ class SafetyAssumptions:
             speed_error_mps=self.speed_error_mps,
             position_error_m=self.position_error_m,
             period_error_s=self.period_error_s,
-        )
-
-
-def _require(config: SafetyAssumptions, name: str, holds: bool, expected: str) -> None:
-    # Written so that not-a-number fails every comparison before it comes here.
-    if not holds:
-        raise ConfigurationError(
-            f"SafetyAssumptions.{name} is {getattr(config, name)}, expected {expected}"
         )

@@ -4,7 +4,7 @@
 from dataclasses import dataclass, field
 from typing import Any
 
-from risk_dqn_planner.vehicle import require_positive
+from risk_dqn_planner.vehicle import require_in_range
 
 
 def _limit(default: float, description: str, minimum: float, maximum: float) -> Any:  # noqa: ANN401
@@ -69,4 +69,4 @@ class PlausibilityLimits:
     )
 
     def __post_init__(self) -> None:
-        require_positive(self, skip=("ego_speed_margin_mps", "object_speed_margin_mps"))
+        require_in_range(self)

@@ -11,7 +11,7 @@ from risk_dqn_planner.situation.report import Fault, FaultyInput, Status
 MS = 1_000_000
 ODOMETRY, AREA, OBJECTS = INPUTS
 # Far behind all stamps, where no input is ahead of it: the clock of most tests.
-ANY_LEAD = AgeLimits(max_input_age_s=0.5, max_input_ahead_s=1000.0)
+ANY_LEAD = AgeLimits(max_input_age_s=0.5, max_input_ahead_s=10.0)
 
 
 def synchroniser() -> Synchroniser:

@@ -21,13 +21,21 @@ def test_every_number_reaches_the_kernels() -> None:
     plain = SafetyAssumptions()
     for field in dataclasses.fields(SafetyAssumptions):
         if field.default is not dataclasses.MISSING:
-            changed = dataclasses.replace(plain, **{field.name: field.default + 0.25})
+            low, high = field.metadata["minimum"], field.metadata["maximum"]
+            other = low if field.default == high else high
+            changed = dataclasses.replace(plain, **{field.name: other})
             assert changed.numbers() != plain.numbers(), field.name
 
 
 @pytest.mark.parametrize(
     "changes",
-    [{"decision_period_s": 0.0}, {"safe_gap_s": -0.1}, {"speed_error_mps": math.nan}],
+    [
+        {"decision_period_s": 0.0},
+        {"safe_gap_s": -0.1},
+        {"safe_gap_s": 1e9},
+        {"speed_error_mps": math.nan},
+        {"follower_braking_mps2": math.inf},
+    ],
 )
 def test_values_out_of_bounds_are_refused(changes: dict[str, Any]) -> None:
     with pytest.raises(ConfigurationError, match=next(iter(changes))):

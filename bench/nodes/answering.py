@@ -20,6 +20,7 @@ from rosgraph_msgs.msg import Clock
 from bench.nodes.listening import Ear, Spread, spread, undisturbed
 from bench.nodes.scene import MovingScene, perception
 from risk_dqn_planner.intersection.model import IntersectionModel
+from risk_dqn_planner.policies.base import Reason
 from risk_dqn_planner.ros import conversions
 from risk_dqn_planner.ros.streams import SECOND_NS
 from risk_dqn_planner.situation.pipeline import SituationPipeline
@@ -31,7 +32,6 @@ from sim_bridge.ros.session import SilentPlannerError, ros_session, wait_until
 
 START_S = 240.0
 _WARM_UP = 10
-_FIRST_FAULT = 20  # reasons from here on are faults, see Decision.msg
 _NOTICE_S = 0.03  # the node has seen the clock by then
 _ANSWER_S = 0.5
 _WORK = 30_000  # some milliseconds
@@ -104,7 +104,7 @@ class _Asker:
         if arrival is None:
             return None
         decision = self.decisions.read(arrival)
-        is_fault = decision.reason >= _FIRST_FAULT
+        is_fault = Reason(decision.reason).is_fault
         if is_fault or conversions.to_ns(decision.situation_stamp) != stamp_ns:
             return None
         return 1e3 * (arrival.at_s - began_s)

@@ -23,6 +23,7 @@ from bench.nodes.cores import bound_to, busy_loops
 from bench.nodes.listening import Arrival, Ear, Spread, spread, undisturbed, uneven
 from bench.nodes.scene import MovingScene
 from risk_dqn_planner.intersection.model import IntersectionModel
+from risk_dqn_planner.policies.base import Reason
 from risk_dqn_planner.ros import conversions
 from sim_bridge.ros import topics
 from sim_bridge.ros.node_group import NodeGroup
@@ -35,7 +36,6 @@ DECISION_PERIOD_S = 0.5
 START_S = 240.0
 SETTLE_S = 60.0  # at most
 LOAD_SETTLES_S = 1.0
-_FIRST_FAULT = 20  # reasons from here on are faults, see Decision.msg
 
 
 @dataclass(frozen=True)
@@ -156,7 +156,7 @@ def _settle(sender: Sender, situations: Ear, decisions: Ear, nodes: NodeGroup) -
         _play(sender, situations, 1.0)
         nodes.check()
         decision: Decision = decisions.newest()
-        if decision.reason < _FIRST_FAULT:
+        if not Reason(decision.reason).is_fault:
             return
     raise SilentPlannerError(f"the planner does not decide on the traffic: {decision.text}")
 
@@ -183,6 +183,6 @@ def _summary(
         uneven=spread(uneven([a.at_s for a in decisions.all()], DECISION_PERIOD_S)),
         late=sum(wait_ms >= 1e3 * PERIOD_S for wait_ms in waits_ms),
         doubtful=sum(r.status != Situation.OK for r in reports)
-        + sum(c.reason >= _FIRST_FAULT for c in choices),
+        + sum(Reason(c.reason).is_fault for c in choices),
         computed_ms=computed_ms,
     )

@@ -20,7 +20,7 @@ from rosbags.typesys import Stores, TypesysError, get_types_from_msg, get_typest
 from rosbags.typesys.store import Typestore
 
 from risk_dqn_planner.errors import BagError
-from risk_dqn_planner.policies.base import Action
+from risk_dqn_planner.policies.base import Action, Reason
 from risk_dqn_planner.ros.streams import SECOND_NS
 from sim_bridge.ros.recording import installed_types
 
@@ -166,7 +166,7 @@ def _moment(stamp_ns: int, message: Any) -> Moment:  # noqa: ANN401 (of a type t
     names = ("reason", "faulty_input", "supervisor")
     cause = [int(getattr(message, name, 0)) for name in names]
     # Of those that nothing hinders, or that a network rates, the nearest vehicle changes often.
-    if message.reason in {1, 2}:
+    if message.reason in {Reason.VEHICLE, Reason.HIDDEN_VEHICLE}:
         cause += [int(message.critical_vehicle_id), int(message.critical_lane_id)]
     why = getattr(message, "explanation", None)
     return Moment(

@@ -23,7 +23,7 @@ __all__ = ["Action", "Decision", "Reason", "explain", "fault_decision", "target_
 
 @dataclass(frozen=True)
 class Decision:
-    """One decision with its reasons, as published (SPEC 7).
+    """One decision with its reasons, as published in Decision.msg.
 
     q_values and action_risks are (3,) by Action, NaN where the policy has none; a risk is in
     [0, 1], 0 safe, 1 fully unsafe, the negated R_risk of the paper after the action.

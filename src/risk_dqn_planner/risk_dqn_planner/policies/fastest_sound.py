@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The fastest action that the joint worst-case check admits (ours, SPEC 4)."""
+"""The fastest action that the joint worst-case check admits (ours, docs/safety.md)."""
 
 import dataclasses
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The supervisor: the joint worst-case check around any policy (ours, SPEC 4)."""
+"""The supervisor: the joint worst-case check around any policy (ours, docs/safety.md)."""
 
 import dataclasses
 import enum

@@ -2,8 +2,8 @@
 """Motion along a path in closed form: constant acceleration up to a speed that is then kept.
 
 The paper gives only the case "zero initial velocity, maximum velocity not reached" (section
-"Risk Reward"); here any start speed and the top speed are covered (SPEC 3). All functions are
-elementwise and may be called from kernels. Distances [m], speeds [m/s], times [s].
+"Risk Reward"); here any start speed and the top speed are covered (docs/paper.md). All functions
+are elementwise and may be called from kernels. Distances [m], speeds [m/s], times [s].
 """
 
 import math

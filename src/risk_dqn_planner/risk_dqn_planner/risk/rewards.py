@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The pieces of R_risk for one pair of ego and vehicle, elementwise (SPEC 3).
+"""The pieces of R_risk for one pair of ego and vehicle, elementwise (docs/paper.md).
 
 Rewards lie in [-1, 0]: 0 fully safe, -1 fully unsafe. Distances are between centres, to the
 centre of the conflict zone, negative once that is passed.

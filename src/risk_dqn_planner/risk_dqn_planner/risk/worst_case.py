@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What others may do at worst, and what the ego can still do, now or a while from now (kernels).
 
-Readings (SPEC 3 and 4): a virtual vehicle sits at d_o, advances at v_o and never leaves. A
+Readings (docs/paper.md): a virtual vehicle sits at d_o, advances at v_o and never leaves. A
 predicted vehicle reaches its zone as if it accelerated from now on, but has left it only if it
 has left keeping its speed.
 """

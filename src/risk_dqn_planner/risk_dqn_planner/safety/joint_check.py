@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which actions are sound: one manoeuvre after them is safe against everyone at once (SPEC 4).
+"""Which actions are sound: one manoeuvre after them is safe against everyone at once.
 
 The paper asks for each vehicle apart whether the ego can stop before it *or* leave before it.
 With adjacent lanes both may hold for different vehicles while no motion does both. Here an action

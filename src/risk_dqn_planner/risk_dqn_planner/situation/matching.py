@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which perceived vehicles are on which intersecting lanes, and where along them (SPEC 1)."""
+"""Which perceived vehicles are on which intersecting lanes, and where along them."""
 
 import math
 

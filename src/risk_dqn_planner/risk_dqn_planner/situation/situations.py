@@ -16,7 +16,7 @@ class Situations(NamedTuple):
 
     A vehicle that is matched to several intersecting lanes fills several of the N places.
     Entries whose mask is False hold no meaning. Distances are between centres and negative
-    once the zone's centre is passed (SPEC 1).
+    once the zone's centre is passed.
 
     stop_line_distance_m (B,): d_e,stl. goal_distance_m (B,): d_e,goal. ego_speed_mps (B,): v_e.
     vehicle_mask (B, N); vehicle_id (B, N); vehicle_lane (B, N): index into the M lanes;

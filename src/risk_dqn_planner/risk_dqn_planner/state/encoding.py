@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One scene as the network sees it: what is selected, and how it is normalised (SPEC 2).
+"""One scene as the network sees it: what is selected, and how it is normalised (docs/paper.md).
 
 A scene is 3 x 8, rows by kind of quantity, columns [ego | 5 vehicles | 2 lanes]:
 row 0: d_e,stl, d_i, d_o; row 1: v_e, v_i, v_o; row 2: d_e,goal, d_e,i, d_e,o.
@@ -40,7 +40,7 @@ class StateConfig:
 
     The paper names no d_max; these cover its sensor range of 70 m. stacked: whole scenes are
     stacked with their slots as they were, the paper's words; otherwise every vehicle and lane
-    chosen now brings its own history, which is what its network asks for (SPEC 2).
+    chosen now brings its own history, which is what its network asks for (docs/paper.md).
     """
 
     stop_line_max_m: float = 70.0

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The state: the last five scenes, each vehicle and lane with its own history (SPEC 2)."""
+"""The state: the last five scenes, each vehicle and lane with its own history (docs/paper.md)."""
 
 from typing import NamedTuple
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Algorithm 1 in situations worked out by hand (SPEC 4).
+"""Algorithm 1 in situations worked out by hand.
 
 At rest at the stop line, 5.5 m before a crossing of 6 m: after 2 s of Fast the ego is 2.5 m
 before the centre at 3 m/s and leaves 1.3667 s later; after 2 s of Slow it is 3.8333 m before it

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Hand-computed values of every branch and limit of R_CSS and R_CSL (SPEC 3)."""
+"""Hand-computed values of every branch and limit of R_CSS and R_CSL (docs/paper.md)."""
 
 import math
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Selection, layout and history of the state (SPEC 2)."""
+"""Selection, layout and history of the state."""
 
 from collections.abc import Callable, Sequence
 from typing import Any

@@ -55,7 +55,7 @@ def _ends(step: EnvironmentStep) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
 
 
 class OccludedIntersectionEnv(gymnasium.Env[NDArray[np.float32], np.int64]):
-    """One episode at a time. Observations are the flattened states (5, 3, 8); see SPEC of state.
+    """One episode at a time. Observations are the flattened states (5, 3, 8), see docs/paper.md.
 
     `reset(seed=k)` begins episode k of the scenario, the same as everywhere else in this
     project; `reset()` goes on with episodes of the training range that follow from it.

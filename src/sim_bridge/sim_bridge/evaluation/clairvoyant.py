@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The exact optimum of an episode with everything known: what no policy can beat (SPEC 4).
+"""The exact optimum of an episode with everything known: what no policy can beat.
 
 It exists where traffic does not react to the ego: then the episode's traffic is one film, and
 the fastest way to the goal a shortest path through it. The ego's three actions reach a finite

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""From episodes to the figures of a cell, each with its 95% interval (SPEC 6)."""
+"""From episodes to the figures of a cell, each with its 95% interval (docs/results_format.md)."""
 
 from typing import Any
 

@@ -200,7 +200,7 @@ class Timing:
 
 @dataclass(frozen=True)
 class Scenario:
-    """A named distribution of episodes (SPEC 5); `description` is one sentence for people."""
+    """A named distribution of episodes; `description` is one sentence for people."""
 
     name: str
     description: str

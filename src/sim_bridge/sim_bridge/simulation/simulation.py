@@ -34,7 +34,7 @@ class StepResult(NamedTuple):
 
     An ended episode keeps its flags and no longer changes until it is reset.
     ran: it was running when the step began. terminated: reached_goal or collided, a terminal
-    state. truncated: timed_out, where learning has to bootstrap (SPEC 4).
+    state. truncated: timed_out, where learning has to bootstrap.
     """
 
     ran: Booleans

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is possible at all, and what is with every step sound: contestants like any other (SPEC 4).
+"""What is possible at all, and what is with every step sound: contestants like any other.
 
 The clairvoyant is exact where traffic does not react to the ego. Elsewhere, and for every sound
 limit, the fastest way that a beam search finds stands in: a lower bound.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Why episodes time out: impossible, the price of soundness, or missed (SPEC 4)."""
+"""Why episodes time out: impossible, the price of soundness, or missed."""
 
 from collections.abc import Iterable
 from typing import NamedTuple

@@ -45,7 +45,14 @@ from risk_dqn_planner.policies.foresight.task import (
 from risk_dqn_planner.safety.assumptions import SafetyAssumptions, SafetyNumbers
 from risk_dqn_planner.safety.course import begin_course
 from risk_dqn_planner.safety.guard import Guard
-from risk_dqn_planner.safety.joint_check import ACTIONS, JointCheck, foresee, go_on, target_of
+from risk_dqn_planner.safety.joint_check import (
+    ACTIONS,
+    JointCheck,
+    foresee,
+    go_on,
+    is_enough,
+    target_of,
+)
 from risk_dqn_planner.safety.known import Known
 from risk_dqn_planner.situation.situations import Booleans, Floats, Integers, Situations
 
@@ -235,7 +242,7 @@ def tell_forecast(later_s: Floats, most_s: float, inputs: Inputs) -> None:
         for k in range(periods):
             at = wait * periods + k
             inputs[at] = share_of(later_s[wait, k], most_s)
-            inputs[ways * periods + at] = 1.0 if later_s[wait, k] >= -_ROUNDING else 0.0
+            inputs[ways * periods + at] = 1.0 if is_enough(later_s[wait, k]) else 0.0
 
 
 @kernel

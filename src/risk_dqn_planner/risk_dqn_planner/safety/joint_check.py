@@ -33,7 +33,7 @@ ACTIONS = 3
 NO_MANOEUVRE = -1
 # Going for longer than this before coming to rest is not looked at.
 _MOST_PERIODS = 16
-# A manoeuvre that is safe by nothing must not fail by rounding when it is looked at again.
+# A manoeuvre that is safe by nothing must not fail by rounding when it is looked at again [s, m].
 _ROUNDING = 1e-6
 
 
@@ -154,6 +154,12 @@ def foresee(
 
 
 @kernel
+def is_enough(margin_s: float) -> bool:
+    """Tell whether a margin makes a manoeuvre sound."""
+    return margin_s >= -_ROUNDING
+
+
+@kernel
 def vindicate(
     s: Situations,
     row: int,
@@ -167,11 +173,13 @@ def vindicate(
 ) -> tuple[int, Verdict]:
     """Return the manoeuvre that makes a course safe, -1 for none, and the verdict on it.
 
-    Without one, the verdict is that of going.
+    arrival_s, who (M,): when somebody reaches each crossing lane's zone at the earliest [s], and
+    the vehicle's index. last_m: way to the end of the last zone [m]. merging: whether a merging
+    lane matters. Without a manoeuvre, the verdict is that of going.
     """
     braking = with_manoeuvre(course, BRAKE, p)
     verdict = judge(s, row, braking, arrival_s, who, known, p)
-    if verdict.margin_s >= -_ROUNDING:
+    if is_enough(verdict.margin_s):
         return BRAKE, verdict
     return go_on(s, row, course, arrival_s, who, known, -math.inf, last_m, merging, p)
 
@@ -191,10 +199,11 @@ def go_on(
 ) -> tuple[int, Verdict]:
     """Return how a course may go on safely, for ever or to a rest beyond a way; -1 for not at all.
 
-    The second is the verdict on it; without one, that of going for ever.
+    beyond_m: a rest counts only after this way [m]; the other arguments as in `vindicate`. The
+    second is the verdict on it; without one, that of going for ever.
     """
     going = judge(s, row, course, arrival_s, who, known, p)
-    if going.margin_s >= -_ROUNDING:
+    if is_enough(going.margin_s):
         return GO, going
     # Behind all zones a rest is of use only where going on for ever fails, behind a leader.
     bound_m = going.bound_m if merging else min(going.bound_m, last_m)
@@ -204,7 +213,7 @@ def go_on(
             break
         if stopping.rest_m > beyond_m + _ROUNDING:
             verdict = judge(s, row, stopping, arrival_s, who, known, p)
-            if verdict.margin_s >= -_ROUNDING:
+            if is_enough(verdict.margin_s):
                 return periods, verdict
         if stopping.rest_m > last_m:
             break
@@ -221,7 +230,7 @@ def judge(
     known: Known,
     p: SafetyNumbers,
 ) -> Verdict:
-    """Return the least margin of a course over all lanes."""
+    """Return the least margin [s] of a course over all lanes, arguments as in `vindicate`."""
     least_s, whose, where, bound_m = math.inf, NOTHING, NOTHING, math.inf
     for lane in range(s.lane_mask.shape[1]):
         if not s.lane_mask[row, lane]:
@@ -231,11 +240,11 @@ def judge(
         else:
             vehicle = who[lane]
             margin_s, within_m = crossing_verdict(s, row, lane, c, arrival_s[lane], p)
-        if margin_s < -_ROUNDING:
+        if not is_enough(margin_s):
             bound_m = min(bound_m, within_m)
         if margin_s < least_s:
             least_s, whose, where = margin_s, vehicle, lane
-        if least_s < -_ROUNDING and c.rest_m < math.inf:
+        if not is_enough(least_s) and c.rest_m < math.inf:
             # Nobody asks by how much a course that comes to rest fails.
             break
     return Verdict(least_s, whose, where, bound_m)

@@ -34,6 +34,7 @@ from risk_dqn_planner.safety.joint_check import (
     ACTIONS,
     NO_MANOEUVRE,
     Verdict,
+    is_enough,
     judge,
     target_of,
     vindicate,
@@ -42,7 +43,6 @@ from risk_dqn_planner.safety.known import Known
 from risk_dqn_planner.safety.others import NOTHING
 from risk_dqn_planner.situation.situations import Booleans, Floats, Integers, Situations
 
-_ROUNDING = 1e-6
 _STOP, _SLOW, _FAST = 0, 1, 2
 
 
@@ -135,7 +135,7 @@ def follow(
             first = action if k == 0 else w.nodes.first[side, i]
             if action == _FAST:
                 going = judge(w.ahead, k, course, w.arrival_s, w.who, w.known, p)
-                if going.margin_s >= -_ROUNDING:
+                if is_enough(going.margin_s):
                     offer(cost_s + least_s, first, w.best)
                     break
                 note_critical(k, going, w.best)

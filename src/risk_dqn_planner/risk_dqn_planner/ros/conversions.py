@@ -251,8 +251,9 @@ def situation_from_records(message: SituationRecords) -> SituationReport:
     """Return what the situation node reports.
 
     Raises:
-        InputError: unknown status or faulty input, a number that is not finite, a lane that
-            appears twice or a vehicle on a lane that is not listed.
+        InputError: unknown status or faulty input, a number that is not finite, a zone or a speed
+            limit that is not above 0, a lane that appears twice or a vehicle on a lane that is
+            not listed.
     """
     try:
         status, source = Status(message.status), FaultyInput(message.faulty_input)
@@ -308,6 +309,11 @@ def _read_situation(message: SituationRecords) -> Situations:
         named = zip(filled._fields, filled, strict=True)
         name = next(name for name, values in named if not np.isfinite(values).all())
         raise _bad_situation(f"{name} is not finite", Status.NOT_FINITE)
+    # Zones of no length and lanes on which nobody can move would make every action sound.
+    for name in ("lane_ego_zone_m", "lane_zone_m", "lane_speed_limit_mps"):
+        least = getattr(filled, name)[0, :m].min(initial=math.inf)
+        if least <= 0.0:
+            raise _bad_situation(f"{name} is {least:g}, expected a number above 0")
     return filled
 
 

@@ -270,6 +270,15 @@ def test_a_situation_with_a_number_that_is_not_finite_is_refused() -> None:
         read(message)
 
 
+@pytest.mark.parametrize("value", [0.0, -5.0])
+@pytest.mark.parametrize("field", ["ego_zone_m", "zone_m", "speed_limit_mps"])
+def test_a_lane_that_would_make_everything_sound_is_refused(field: str, value: float) -> None:
+    message = conversions.situation_to_message(REPORT)
+    setattr(message.lanes[0], field, value)
+    with pytest.raises(InputError, match=f"lane_{field} is {value:g}, expected a number above 0"):
+        read(message)
+
+
 def test_a_vehicle_on_a_lane_that_is_not_listed_is_refused() -> None:
     message = conversions.situation_to_message(REPORT)
     message.vehicles.append(RelevantVehicle(vehicle_id=5, lane_id=99))

@@ -167,6 +167,8 @@ def test_whatever_is_perceived_gives_a_sound_situation_or_a_fault_that_is_the_in
 @st.composite
 def situations(draw: st.DrawFn, values: st.SearchStrategy[float]) -> Situation:
     lanes = draw(st.lists(identity, max_size=3))
+    above_0 = values.map(abs)
+    size = st.one_of(above_0, above_0, above_0, above_0, above_0, values)
     return Situation(
         header=conversions.header(draw(st.integers(0, 3)) * 500 * MS, "map"),
         status=draw(st.one_of(st.just(0), st.just(0), st.integers(0, 255))),
@@ -180,10 +182,10 @@ def situations(draw: st.DrawFn, values: st.SearchStrategy[float]) -> Situation:
                 lane_id=lane,
                 kind=draw(st.integers(0, 255)),
                 ego_distance_m=draw(values),
-                ego_zone_m=draw(values),
-                zone_m=draw(values),
+                ego_zone_m=draw(size),
+                zone_m=draw(size),
                 hidden_distance_m=draw(values),
-                speed_limit_mps=draw(values),
+                speed_limit_mps=draw(size),
             )
             for lane in lanes
         ],

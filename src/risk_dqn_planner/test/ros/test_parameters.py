@@ -311,3 +311,16 @@ def test_the_parameter_file_holds_all_parameters_with_their_defaults() -> None:
         del policy[argument]  # too
     assert found["/**/situation"] == pytest.approx(situation, abs=1e-4)
     assert found["/**/policy"] == pytest.approx(policy)
+
+
+def keys_twice(node: yaml.Node) -> list[str]:
+    if not isinstance(node, yaml.MappingNode):
+        return []
+    names = [key.value for key, _ in node.value]
+    twice = [name for name in names if names.count(name) > 1]
+    return twice + [name for _, value in node.value for name in keys_twice(value)]
+
+
+def test_nothing_stands_twice_in_the_parameter_file() -> None:
+    document = yaml.compose(PLANNER_YAML.read_text("utf-8"))
+    assert keys_twice(document) == []

@@ -11,6 +11,7 @@ from risk_dqn_planner.policies.supervised import SupervisorMode, supervisor_mode
 from risk_dqn_planner.safety.assumptions import SafetyAssumptions
 from risk_dqn_planner.situation.config import INSTANTANEOUS, require_memory
 from sim_bridge.learning.config import TrainingConfig
+from sim_bridge.options import LARGEST_SEED
 
 
 @dataclass(frozen=True)
@@ -37,8 +38,8 @@ class Run:
     projector: str = DEFAULT_PROJECTOR
 
     def __post_init__(self) -> None:
-        if self.seed < 0:
-            raise ConfigurationError(f"seed is {self.seed}, expected 0 or more")
+        if not 0 <= self.seed <= LARGEST_SEED:
+            raise ConfigurationError(f"seed is {self.seed}, expected 0 to {LARGEST_SEED}")
         require_memory(self.memory)
         if supervisor_mode(self.supervisor) is SupervisorMode.REPORT:
             raise ConfigurationError(

@@ -15,7 +15,7 @@ from typing import Any
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-from risk_dqn_planner.errors import PlannerError
+from risk_dqn_planner.errors import ConfigurationError, PlannerError
 from sim_bridge.environment.place import Places
 from sim_bridge.environment.rewards import REWARDS
 from sim_bridge.folders import writing_to
@@ -122,6 +122,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     name = arguments.name or f"{arguments.reward}_{arguments.preset}"
     out = arguments.out or Path("out/training") / f"{name}_seed{arguments.seed}"
     try:
+        if Path(name).name != name:
+            raise ConfigurationError(f"name is {name!r}, expected one without slashes")
         route, origin = route_and_origin(arguments.route, arguments.origin)
         run = Run(
             config=_config(arguments),

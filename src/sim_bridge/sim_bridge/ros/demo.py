@@ -18,6 +18,7 @@ from rich.console import Console
 from risk_dqn_planner.errors import PlannerError
 from risk_dqn_planner.policies.loading import load_policy
 from sim_bridge.folders import writing_to
+from sim_bridge.options import number, whole_number
 from sim_bridge.ros.drive import drive
 from sim_bridge.ros.observer import EpisodeStuckError
 from sim_bridge.ros.pictures import EpisodePictures
@@ -42,21 +43,22 @@ _BROKEN_RUN = (NodeDiedError, EpisodeStuckError, SilentPlannerError)
 def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="demo", description=__doc__)
     add_run_arguments(parser)
-    parser.add_argument("--episodes", type=int, default=6, help="how many [%(default)s]")
-    parser.add_argument("--seed", type=int, default=0, help="of the first episode [%(default)s]")
+    parser.add_argument(
+        "--episodes", type=whole_number(1), default=6, help="how many [%(default)s]"
+    )
+    parser.add_argument(
+        "--seed", type=whole_number(0), default=0, help="of the first episode [%(default)s]"
+    )
     parser.add_argument(
         "--rate",
-        type=float,
+        type=number(0.0, 1000.0),
         default=0.0,
         help="highest ratio of simulated to real time, 0 for as fast as possible [%(default)s]",
     )
     parser.add_argument(
         "--out", type=Path, default=_DEFAULT_OUT, help="output folder [%(default)s]"
     )
-    arguments = parser.parse_args(argv)
-    if arguments.episodes < 1 or arguments.seed < 0 or arguments.rate < 0.0:
-        parser.error("expected at least 1 episode, and neither seed nor rate below 0")
-    return arguments
+    return parser.parse_args(argv)
 
 
 def _clear(folder: Path) -> None:

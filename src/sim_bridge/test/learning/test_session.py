@@ -189,8 +189,10 @@ def test_command_names_what_it_cannot_use(capsys: pytest.CaptureFixture[str]) ->
     assert "there is no preset 'fast'" in capsys.readouterr().err
     assert main(["--projector", "globe"]) == 2
     assert "unknown map projector 'globe'" in capsys.readouterr().err
+    assert main(["--name", "../elsewhere"]) == 2
+    assert "name is '../elsewhere', expected one without slashes" in capsys.readouterr().err
     assert main(["--seed", "-1"]) == 2
-    assert "seed is -1, expected 0 or more" in capsys.readouterr().err
+    assert "seed is -1, expected 0 to 9223372036854775807" in capsys.readouterr().err
 
 
 def test_a_folder_that_cannot_be_written_is_named(

@@ -39,9 +39,21 @@ def test_a_folder_that_cannot_be_written_is_named(
     assert "cannot write to" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("option", ["--episodes=0", "--seed=-1", "--rate=-1"])
-def test_numbers_out_of_range_are_refused(capsys: pytest.CaptureFixture[str], option: str) -> None:
+@pytest.mark.parametrize(
+    ("option", "expected"),
+    [
+        ("--episodes=0", "--episodes: '0' is out of range, expected a whole number from 1"),
+        ("--episodes=abc", "argument --episodes: 'abc' is out of range"),
+        ("--seed=-1", "argument --seed: '-1' is out of range, expected a whole number from 0"),
+        ("--seed=99999999999999999999", "to 9223372036854775807"),
+        ("--rate=-1", "argument --rate: '-1' is out of range, expected a number from 0 to 1000"),
+        ("--rate=nan", "argument --rate: 'nan' is out of range"),
+    ],
+)
+def test_numbers_out_of_range_are_refused_by_name(
+    capsys: pytest.CaptureFixture[str], option: str, expected: str
+) -> None:
     with pytest.raises(SystemExit) as end:
         main([option])
     assert end.value.code == 2
-    assert "expected at least 1 episode" in capsys.readouterr().err
+    assert expected in capsys.readouterr().err

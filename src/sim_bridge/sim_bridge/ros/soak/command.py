@@ -22,6 +22,7 @@ from risk_dqn_planner.errors import PlannerError
 from risk_dqn_planner.policies.loading import load_policy
 from sim_bridge.folders import writing_to
 from sim_bridge.learning.checkpoint import git_revision
+from sim_bridge.options import number, whole_number
 from sim_bridge.ros.node_group import NodeGroup
 from sim_bridge.ros.process import NodeCommand, NodeDiedError
 from sim_bridge.ros.run_settings import RunSettings, add_run_arguments, run_settings
@@ -63,16 +64,18 @@ def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="soak", description=__doc__)
     add_run_arguments(parser)
     parser.add_argument(
-        "--hours", type=float, default=1.0, help="of simulated driving [%(default)s]"
+        "--hours",
+        type=number(0.001, 1000.0),
+        default=1.0,
+        help="of simulated driving [%(default)s]",
     )
-    parser.add_argument("--seed", type=int, default=0, help="of the first episode [%(default)s]")
+    parser.add_argument(
+        "--seed", type=whole_number(0), default=0, help="of the first episode [%(default)s]"
+    )
     parser.add_argument(
         "--out", type=Path, default=_DEFAULT_OUT, help="output folder [%(default)s]"
     )
-    arguments = parser.parse_args(argv)
-    if not 0.0 < arguments.hours <= 1000.0 or arguments.seed < 0:
-        parser.error("expected hours above 0, at most 1000, and no seed below 0")
-    return arguments
+    return parser.parse_args(argv)
 
 
 def _commands(settings: RunSettings, seed: int) -> list[NodeCommand]:

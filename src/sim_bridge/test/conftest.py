@@ -50,6 +50,7 @@ def model_of(*lanes: IntersectingLane, goal_m: float = 120.0) -> IntersectionMod
         lanes=lanes,
         stop_line=StopLine(94.0, None),
         goal_m=goal_m,
+        leaders_until_m=goal_m + 15.0,
         ego_dimensions=VehicleDimensions(),
         traffic_dimensions=VehicleDimensions(),
         notes=(),

@@ -48,12 +48,15 @@ def build_intersection(
     stop_line, stop_notes = find_stop_line(road_map, ego, first_zone, config)
     notes.extend(stop_notes)
     goal_m = _goal_m(ego, max(conflict.ego.end for conflict in conflicts), config, notes)
+    leaders_until_m = goal_m + config.leaders_beyond_goal_m
+    notes.extend(_leaders_out_of_map(ego, lanes, goal_m, leaders_until_m))
     return IntersectionModel(
         route=tuple(route),
         ego_path=lane_path(ego.chain),
         lanes=lanes,
         stop_line=stop_line,
         goal_m=goal_m,
+        leaders_until_m=leaders_until_m,
         ego_dimensions=config.ego_dimensions,
         traffic_dimensions=config.traffic_dimensions,
         notes=tuple(dict.fromkeys(notes)),
@@ -131,3 +134,17 @@ def _goal_m(
         )
         return length_m
     return goal_m
+
+
+def _leaders_out_of_map(
+    ego: EgoRoute, lanes: Sequence[IntersectingLane], goal_m: float, leaders_until_m: float
+) -> list[str]:
+    """Return what to say if vehicles that have merged leave the map while they still matter."""
+    length_m = ego.chain.centerline.length_m
+    merging = any(lane.kind is ConflictKind.MERGING for lane in lanes)
+    if not merging or leaders_until_m <= length_m:
+        return []
+    return [
+        f"the map ends {length_m - goal_m:.1f} m past the goal, so who has merged is not seen up "
+        f"to {leaders_until_m - goal_m:g} m past it"
+    ]

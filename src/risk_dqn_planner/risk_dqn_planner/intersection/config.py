@@ -17,6 +17,8 @@ class IntersectionConfig:
     stop_line_setback_m: a derived stop position lies this far before the first zone.
     max_stop_line_distance_m: a stop line farther before the first zone belongs elsewhere.
     goal_beyond_m: the goal lies this far past the end of the last zone.
+    leaders_beyond_goal_m: who has merged matters up to this far past the goal: an ego that comes to
+        rest just behind its goal shall see whom it might run into.
     ego_upstream_m: the ego's path begins at least this far before its route.
     downstream_m: intersecting lanes are followed this far past the lanelet of their zone.
     hairline_m: contacts shorter than this along the ego's path are no conflicts.
@@ -30,6 +32,7 @@ class IntersectionConfig:
     stop_line_setback_m: float = 2.5
     max_stop_line_distance_m: float = 15.0
     goal_beyond_m: float = 17.0
+    leaders_beyond_goal_m: float = 15.0
     ego_upstream_m: float = 60.0
     downstream_m: float = 40.0
     hairline_m: float = 0.5

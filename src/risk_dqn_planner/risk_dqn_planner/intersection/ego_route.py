@@ -75,7 +75,8 @@ def ego_route(road_map: RoadMap, route: Sequence[int], config: IntersectionConfi
     lanelets = resolve_route(road_map, route)
     before = straight_upstream(road_map, lanelets[0], config.ego_upstream_m, route)
     used = {*route, *(int(lanelet.id) for lanelet in before)}
-    after = straight_downstream(road_map, lanelets[-1], config.goal_beyond_m + SPARE_M, used)
+    onward_m = SPARE_M + config.goal_beyond_m + config.leaders_beyond_goal_m
+    after = straight_downstream(road_map, lanelets[-1], onward_m, used)
     return EgoRoute(
         chain=chain([*before, *lanelets, *after]),
         first=len(before),

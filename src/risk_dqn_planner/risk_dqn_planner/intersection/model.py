@@ -92,6 +92,7 @@ class IntersectionModel:
 
     route: the lanelets asked for; `ego_path` may reach further up- and downstream.
     lanes: ordered by (ego_zone_center_m, lane_id).
+    leaders_until_m: ego arc length up to which vehicles that have merged matter, past the goal.
     notes: sentences on what the map lacked or contradicted and what was taken instead.
     """
 
@@ -100,6 +101,7 @@ class IntersectionModel:
     lanes: tuple[IntersectingLane, ...]
     stop_line: StopLine
     goal_m: float
+    leaders_until_m: float
     ego_dimensions: VehicleDimensions
     traffic_dimensions: VehicleDimensions
     notes: tuple[str, ...]

@@ -59,9 +59,10 @@ def _relevant_until(
     """Return the arc length on a path behind which vehicles do not matter any more.
 
     A crossing vehicle matters until it has left the zone. One that has merged is the ego's
-    leader from then on, and matters up to the ego's goal.
+    leader from then on, and matters past the ego's goal as well, or the ego would run into one
+    that comes to rest there.
     """
     end = conflict.zone_center_m + 0.5 * lane.zone_length_m
     if lane.kind == ConflictKind.MERGING:
-        end = max(end, conflict.join_m + model.goal_m - lane.ego_join_m)
+        end = max(end, conflict.join_m + model.leaders_until_m - lane.ego_join_m)
     return min(end, conflict.path.centerline.length_m)

@@ -50,6 +50,7 @@ def crossing_model() -> IntersectionModel:
         lanes=(lane,),
         stop_line=StopLine(position_m=54.0, lanelet2_id=None),
         goal_m=80.0,
+        leaders_until_m=90.0,
         ego_dimensions=VehicleDimensions(),
         traffic_dimensions=VehicleDimensions(),
         notes=(),

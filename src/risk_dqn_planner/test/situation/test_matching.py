@@ -125,7 +125,10 @@ def test_on_a_lane_that_passes_one_place_twice_the_heading_tells_which_time() ->
 
 
 def merging_model() -> IntersectionModel:
-    """A lane from the south joins the ego's lane at the origin; the ego's goal is 20 m on."""
+    """A lane from the south joins the ego's lane at the origin; the ego's goal is 20 m on.
+
+    Leaders matter for 10 m more.
+    """
     model = crossing_model()
     line = Polyline.from_points([[-30.0, -30.0], [0.0, 0.0], [40.0, 0.0]])
     join = math.hypot(30.0, 30.0)
@@ -142,8 +145,10 @@ def merging_model() -> IntersectionModel:
     return replace(model, lanes=(lane,))
 
 
-@pytest.mark.parametrize(("x", "expected"), [(15.0, [-20.0]), (19.9, [-24.9]), (20.1, [])])
-def test_a_vehicle_that_has_merged_counts_up_to_the_goal(x: float, expected: list[float]) -> None:
+@pytest.mark.parametrize(("x", "expected"), [(15.0, [-20.0]), (29.9, [-34.9]), (30.1, [])])
+def test_a_vehicle_that_has_merged_counts_until_past_the_goal(
+    x: float, expected: list[float]
+) -> None:
     matched = match(merging_model(), object_arrays([[x, 0.0, 0.0, 5.0]]))
     assert [d for _, _, d, _ in matched] == pytest.approx(expected)
 

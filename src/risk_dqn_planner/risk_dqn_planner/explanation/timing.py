@@ -42,8 +42,11 @@ def of_prediction(config: RuleBasedConfig, assumptions: SafetyAssumptions) -> Ya
     numbers = assumptions.numbers()._replace(
         period_s=config.horizon_s,
         delay_s=0.0,
+        delay_least_s=0.0,
         ego_up_mps2=ego.acceleration_mps2,
+        ego_up_most_mps2=ego.acceleration_mps2,
         ego_down_mps2=ego.braking_mps2,
+        ego_down_most_mps2=ego.braking_mps2,
         fast_mps=ego.fast_mps,
         slow_mps=ego.slow_mps,
         others_up_mps2=traffic.acceleration_mps2,
@@ -79,9 +82,9 @@ def leave_times(
     leave_s = np.empty(s.lane_mask.shape[1])
     for lane in range(len(leave_s)):
         end_m = s.lane_ego_distance_m[0, lane] + 0.5 * s.lane_ego_zone_m[0, lane]
-        leave_s[lane] = time_at(course, end_m, p)
+        leave_s[lane] = time_at(course.slowest, end_m)
         if not math.isfinite(leave_s[lane]):
-            leave_s[lane] = time_at(going, end_m, p)
+            leave_s[lane] = time_at(going.slowest, end_m)
     return leave_s
 
 
@@ -152,7 +155,7 @@ def tightest_leader(s: Situations, action: Action, by: Yardstick) -> Leader | No
         if not has_joined(s, whom) or ahead_m <= 0.0:
             continue
         slow_mps = max(float(s.vehicle_speed_mps[0, k]) - p.speed_error_mps, 0.0)
-        room_m = float(leader_margin(braking, ahead_m, slow_mps, p))
+        room_m = float(leader_margin(braking.fastest, ahead_m, slow_mps, p))
         found.append((room_m, int(s.vehicle_id[0, k]), int(s.lane_id[0, whom.lane]), whom))
     if not found:
         return None

@@ -144,7 +144,5 @@ def _leaders_out_of_map(
     merging = any(lane.kind is ConflictKind.MERGING for lane in lanes)
     if not merging or leaders_until_m <= length_m:
         return []
-    return [
-        f"the map ends {length_m - goal_m:.1f} m past the goal, so who has merged is not seen up "
-        f"to {leaders_until_m - goal_m:g} m past it"
-    ]
+    text = f"the map ends {length_m - goal_m:.1f} m past the goal, and with it who has merged"
+    return [text]

@@ -17,8 +17,8 @@ class IntersectionConfig:
     stop_line_setback_m: a derived stop position lies this far before the first zone.
     max_stop_line_distance_m: a stop line farther before the first zone belongs elsewhere.
     goal_beyond_m: the goal lies this far past the end of the last zone.
-    leaders_beyond_goal_m: who has merged matters up to this far past the goal: an ego that comes to
-        rest just behind its goal shall see whom it might run into.
+    leaders_beyond_goal_m: who has merged matters up to this far past the goal, 0 or more: an ego
+        that drives on shall see whom it might run into.
     ego_upstream_m: the ego's path begins at least this far before its route.
     downstream_m: intersecting lanes are followed this far past the lanelet of their zone.
     hairline_m: contacts shorter than this along the ego's path are no conflicts.
@@ -43,7 +43,9 @@ class IntersectionConfig:
             value = getattr(self, item.name)
             if isinstance(value, VehicleDimensions):
                 continue
-            if not (math.isfinite(value) and value > 0.0):
+            may_be_0 = item.name == "leaders_beyond_goal_m"
+            if not (math.isfinite(value) and (value > 0.0 or (may_be_0 and value == 0.0))):
+                expected = "0 or more" if may_be_0 else "a number above 0"
                 raise ConfigurationError(
-                    f"IntersectionConfig.{item.name} is {value}, expected a number above 0"
+                    f"IntersectionConfig.{item.name} is {value}, expected {expected}"
                 )

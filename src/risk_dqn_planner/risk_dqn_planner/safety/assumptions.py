@@ -20,8 +20,11 @@ class SafetyNumbers(NamedTuple):
 
     period_s: float
     delay_s: float
+    delay_least_s: float
     ego_up_mps2: float
+    ego_up_most_mps2: float
     ego_down_mps2: float
+    ego_down_most_mps2: float
     fast_mps: float
     slow_mps: float
     others_up_mps2: float
@@ -44,7 +47,7 @@ class SafetyNumbers(NamedTuple):
 class SafetyAssumptions:
     """Limits of everyone's motion, and hard margins, not desired ones.
 
-    ego: what the ego's actions do for certain; its braking is that of Stop. traffic: the others'
+    ego: what the ego's actions do at least; its braking is that of Stop. traffic: the others'
     acceleration. vehicle: footprints in a lane that the ego shares with others.
     """
 
@@ -56,8 +59,26 @@ class SafetyAssumptions:
     actuation_delay_s: float = field(
         default=0.0,
         metadata={"description": "From the time of the situation until the ego carries out a "
-                  "decision; until then the one before is in force [s]",
+                  "decision, at most; until then the one before is in force [s]",
                   "minimum": 0.0, "maximum": 5.0},
+    )  # fmt: skip
+    actuation_jitter_s: float = field(
+        default=0.0,
+        metadata={"description": "Decisions may be carried out earlier than after "
+                  "actuation_delay_s, by so much at most [s]",
+                  "minimum": 0.0, "maximum": 5.0},
+    )  # fmt: skip
+    ego_acceleration_factor: float = field(
+        default=1.0,
+        metadata={"description": "The ego accelerates at least as hard as ego.acceleration_mps2, "
+                  "and at most this many times as hard",
+                  "minimum": 1.0, "maximum": 10.0},
+    )  # fmt: skip
+    ego_braking_factor: float = field(
+        default=1.0,
+        metadata={"description": "The ego brakes at least as hard as ego.braking_mps2, and at "
+                  "most this many times as hard",
+                  "minimum": 1.0, "maximum": 10.0},
     )  # fmt: skip
     speed_limit_factor: float = field(
         default=1.0,
@@ -133,12 +154,18 @@ class SafetyAssumptions:
 
     def __post_init__(self) -> None:
         require_in_range(self)
-        least_mps2 = self.ego.braking_mps2
+        longest_s = min(self.actuation_delay_s, self.decision_period_s)
+        if self.actuation_jitter_s > longest_s:
+            raise ConfigurationError(
+                f"SafetyAssumptions.actuation_jitter_s is {self.actuation_jitter_s}, expected at "
+                f"most actuation_delay_s and decision_period_s ({longest_s:g})"
+            )
+        least_mps2 = self.ego.braking_mps2 * self.ego_braking_factor
         if self.leader_braking_mps2 < least_mps2:
             raise ConfigurationError(
                 f"SafetyAssumptions.leader_braking_mps2 is {self.leader_braking_mps2}, expected at "
-                f"least the ego's braking ({least_mps2:g}): a leader that stops more gently than "
-                "the ego would be nearest in between, which the check does not look at"
+                f"least the ego's hardest braking ({least_mps2:g}): a leader that stops more "
+                "gently than the ego would be nearest in between, which the check does not look at"
             )
 
     def numbers(self) -> SafetyNumbers:
@@ -146,8 +173,11 @@ class SafetyAssumptions:
         return SafetyNumbers(
             period_s=self.decision_period_s,
             delay_s=self.actuation_delay_s,
+            delay_least_s=self.actuation_delay_s - self.actuation_jitter_s,
             ego_up_mps2=self.ego.acceleration_mps2,
+            ego_up_most_mps2=self.ego.acceleration_mps2 * self.ego_acceleration_factor,
             ego_down_mps2=self.ego.braking_mps2,
+            ego_down_most_mps2=self.ego.braking_mps2 * self.ego_braking_factor,
             fast_mps=self.ego.fast_mps,
             slow_mps=self.ego.slow_mps,
             others_up_mps2=self.traffic.acceleration_mps2,

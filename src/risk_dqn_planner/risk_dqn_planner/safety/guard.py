@@ -6,7 +6,7 @@ import numpy as np
 from risk_dqn_planner.safety.assumptions import SafetyAssumptions
 from risk_dqn_planner.safety.commitment import Commitments
 from risk_dqn_planner.safety.familiarity import Familiarity
-from risk_dqn_planner.safety.joint_check import JointCheck, joint_check
+from risk_dqn_planner.safety.joint_check import UNKNOWN, JointCheck, joint_check
 from risk_dqn_planner.safety.known import Known
 from risk_dqn_planner.safety.speeds import SpeedBounds
 from risk_dqn_planner.situation.situations import Booleans, Integers, Situations
@@ -16,11 +16,13 @@ class Guard:
     """For each decision call `look`, choose, and call `decided`.
 
     Where nothing is admissible, `otherwise` is what was verified last: sound all the same.
-    Public for reading: in_force (B,) and known, as in `joint_check`, of the last look.
+    Public for reading, of the last look: known, as in `joint_check`, and in_force (B,), where a
+    row that restarts is taken to begin with Stop.
     """
 
     def __init__(self, assumptions: SafetyAssumptions | None = None) -> None:
         self.assumptions = assumptions or SafetyAssumptions()
+        self._delayed = self.assumptions.actuation_delay_s > 0.0
         self._commitments = Commitments()
         self._familiarity = Familiarity(self.assumptions)
         self._speeds = SpeedBounds(self.assumptions)
@@ -30,11 +32,13 @@ class Guard:
     def look(self, situations: Situations, restart: Booleans) -> JointCheck:
         """Check the actions of B situations; `restart` (B,) marks where the memory is void."""
         self.in_force = self._commitments.in_force(restart)
+        # Who takes over does not know what the ego still carries out.
+        in_force = np.where(restart, UNKNOWN, self.in_force) if self._delayed else self.in_force
         self.known = Known(
             self._familiarity.reacted_m(situations, restart),
             *self._speeds.look(situations, restart),
         )
-        return joint_check(situations, self.assumptions, self.in_force, self.known)
+        return joint_check(situations, self.assumptions, in_force, self.known)
 
     def otherwise(self) -> Integers:
         """Return the action (B,) that carries on with the manoeuvre verified last."""

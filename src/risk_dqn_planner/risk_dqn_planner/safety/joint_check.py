@@ -20,7 +20,7 @@ from risk_dqn_planner.safety.course import (
     BRAKE,
     GO,
     Course,
-    begin_course,
+    begin_between,
     time_at,
     with_manoeuvre,
 )
@@ -31,6 +31,8 @@ from risk_dqn_planner.situation.situations import Booleans, Floats, Integers, Si
 
 ACTIONS = 3
 NO_MANOEUVRE = -1
+# Of the action in force: any may be.
+UNKNOWN = -1
 # Going for longer than this before coming to rest is not looked at.
 _MOST_PERIODS = 16
 # A manoeuvre that is safe by nothing must not fail by rounding when it is looked at again [s, m].
@@ -76,7 +78,8 @@ def joint_check(
 ) -> JointCheck:
     """Return for each situation which actions are admissible, and why.
 
-    in_force (B,): the action before, carried on during the actuation delay; Stop by default.
+    in_force (B,): the action before, carried on during the actuation delay, or UNKNOWN; Stop by
+    default.
     known: what was learnt before; by default this is the first look.
     """
     batch, p = len(situations.lane_mask), assumptions.numbers()
@@ -112,11 +115,9 @@ def check_into(
     for row in range(s.ego_speed_mps.shape[0]):
         last_m, merging = foresee(s, row, known, p, arrival_s, who)
         for action in range(ACTIONS):
-            course = begin_course(
-                max(s.ego_speed_mps[row], 0.0),
-                target_of(in_force[row], p),
-                target_of(action, p),
-                p,
+            least_mps, most_mps = targets_in_force(in_force[row], p)
+            course = begin_between(
+                max(s.ego_speed_mps[row], 0.0), least_mps, most_mps, target_of(action, p), p
             )
             periods, verdict = vindicate(s, row, course, arrival_s, who, known, last_m, merging, p)
             result.admissible[row, action] = periods != NO_MANOEUVRE
@@ -124,6 +125,15 @@ def check_into(
             result.margin_s[row, action] = verdict.margin_s
             result.critical_vehicle[row, action] = verdict.vehicle
             result.critical_lane[row, action] = verdict.lane
+
+
+@kernel
+def targets_in_force(in_force: int, p: SafetyNumbers) -> tuple[float, float]:
+    """Return between which targets the one in force lies."""
+    if in_force == UNKNOWN:
+        return 0.0, p.fast_mps
+    target_mps = target_of(in_force, p)
+    return target_mps, target_mps
 
 
 @kernel
@@ -209,13 +219,13 @@ def go_on(
     bound_m = going.bound_m if merging else min(going.bound_m, last_m)
     for periods in range(1, _MOST_PERIODS + 1):
         stopping = with_manoeuvre(course, periods, p)
-        if stopping.rest_m > bound_m + _ROUNDING:
+        if stopping.fastest.rest_m > bound_m + _ROUNDING:
             break
-        if stopping.rest_m > beyond_m + _ROUNDING:
+        if stopping.slowest.rest_m > beyond_m + _ROUNDING:
             verdict = judge(s, row, stopping, arrival_s, who, known, p)
             if is_enough(verdict.margin_s):
                 return periods, verdict
-        if stopping.rest_m > last_m:
+        if stopping.slowest.rest_m > last_m:
             break
     return NO_MANOEUVRE, going
 
@@ -244,7 +254,7 @@ def judge(
             bound_m = min(bound_m, within_m)
         if margin_s < least_s:
             least_s, whose, where = margin_s, vehicle, lane
-        if not is_enough(least_s) and c.rest_m < math.inf:
+        if not is_enough(least_s) and c.fastest.rest_m < math.inf:
             # Nobody asks by how much a course that comes to rest fails.
             break
     return Verdict(least_s, whose, where, bound_m)
@@ -258,12 +268,12 @@ def crossing_verdict(
     half_m = 0.5 * s.lane_ego_zone_m[row, lane]
     end_m = s.lane_ego_distance_m[row, lane] + half_m
     before_m = s.lane_ego_distance_m[row, lane] - half_m - p.zone_margin_m
-    if c.rest_m <= before_m + _ROUNDING or end_m <= 0.0 or arrival_s == math.inf:
+    if c.fastest.rest_m <= before_m + _ROUNDING or end_m <= 0.0 or arrival_s == math.inf:
         return math.inf, before_m
     # At rest in the zone, or not far enough from it, is no place to be.
-    if c.rest_m < end_m + p.zone_margin_m:
+    if c.slowest.rest_m < end_m + p.zone_margin_m:
         return -math.inf, before_m
-    return arrival_s - time_at(c, end_m, p) - p.safe_gap_s, before_m
+    return arrival_s - time_at(c.slowest, end_m) - p.safe_gap_s, before_m
 
 
 @kernel
@@ -273,9 +283,9 @@ def merging_verdict(
     """Return the room left at a merging lane as time, whose it is, and within what way to rest."""
     start_m = s.lane_ego_distance_m[row, lane] - 0.5 * s.lane_ego_zone_m[row, lane]
     before_m = start_m - p.zone_margin_m
-    if c.rest_m <= before_m + _ROUNDING:
+    if c.fastest.rest_m <= before_m + _ROUNDING:
         return math.inf, NOTHING, before_m
-    if c.rest_m <= start_m:
+    if c.slowest.rest_m <= start_m:
         return -math.inf, NOTHING, before_m
     room_m, vehicle, within_m = merging_margin(s, row, lane, known, c, p, start_m)
     return room_m / p.fast_mps, vehicle, within_m

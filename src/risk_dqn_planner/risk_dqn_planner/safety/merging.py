@@ -11,14 +11,14 @@ import math
 from risk_dqn_planner.compiled import kernel
 from risk_dqn_planner.risk.rewards import leader_gap
 from risk_dqn_planner.safety.assumptions import SafetyNumbers
-from risk_dqn_planner.safety.course import Course, speed_at, time_at, way_at
+from risk_dqn_planner.safety.course import Course, Motion, speed_at, time_at, way_at
 from risk_dqn_planner.safety.known import Known
 from risk_dqn_planner.safety.others import advance, hidden_speed, top_speed
 from risk_dqn_planner.situation.situations import Situations
 
 
 @kernel
-def leader_margin(c: Course, ahead_m: float, mps: float, p: SafetyNumbers) -> float:
+def leader_margin(c: Motion, ahead_m: float, mps: float, p: SafetyNumbers) -> float:
     """Return the room that remains when both have come to rest; minus infinity for no leader.
 
     The leader brakes from now on, at least as hard as the ego ever does. So its lead in speed only
@@ -32,7 +32,7 @@ def leader_margin(c: Course, ahead_m: float, mps: float, p: SafetyNumbers) -> fl
 
 @kernel
 def follower_margin(
-    c: Course,
+    c: Motion,
     ahead_m: float,
     mps: float,
     top_mps: float,
@@ -50,10 +50,10 @@ def follower_margin(
     """
     room_m = -ahead_m - p.between_centres_m - gap_m
     way_m, _ = advance(mps, top_mps, enter_s, p)
-    margin_m = room_m + way_at(c, enter_s, p) - way_m
+    margin_m = room_m + way_at(c, enter_s) - way_m
     react_s = enter_s + reaction_s
     way_m, speed_mps = advance(mps, top_mps, react_s, p)
-    margin_m = min(margin_m, room_m + way_at(c, react_s, p) - way_m)
+    margin_m = min(margin_m, room_m + way_at(c, react_s) - way_m)
     down = p.follower_down_mps2
     if c.rest_m < math.inf:
         margin_m = min(margin_m, room_m + c.rest_m - way_m - 0.5 * speed_mps * speed_mps / down)
@@ -62,10 +62,10 @@ def follower_margin(
         braking_s = min(settled_s - react_s, speed_mps / down)
         way_m += (speed_mps - 0.5 * down * braking_s) * braking_s
         speed_mps -= down * braking_s
-        margin_m = min(margin_m, room_m + way_at(c, settled_s, p) - way_m)
-        closing_mps = max(speed_mps - speed_at(c, settled_s, p), 0.0)
+        margin_m = min(margin_m, room_m + way_at(c, settled_s) - way_m)
+        closing_mps = max(speed_mps - speed_at(c, settled_s), 0.0)
         needed_m = 0.5 * closing_mps * closing_mps / down
-        margin_m = min(margin_m, room_m + way_at(c, settled_s, p) - way_m - needed_m)
+        margin_m = min(margin_m, room_m + way_at(c, settled_s) - way_m - needed_m)
     return margin_m
 
 
@@ -85,8 +85,9 @@ def merging_margin(
     rest no further than this from now on nobody would forbid it; infinity if nobody does.
     known: see `joint_check`.
     """
-    enter_s = time_at(c, start_m, p)
-    least_m, who = hidden_margin(s, row, lane, c, enter_s, p), -1
+    # Who is ahead fears the fastest motion, who is behind the slowest.
+    enter_s = time_at(c.slowest, start_m)
+    least_m, who = hidden_margin(s, row, lane, c.slowest, enter_s, p), -1
     before_m = start_m - p.zone_margin_m
     bound_m = math.inf if least_m >= 0.0 else before_m
     needed_m = p.between_centres_m + p.clearance_m
@@ -101,7 +102,7 @@ def merging_margin(
         now_m = distance_m[row, vehicle]
         ahead_m = leader_gap(ego_m, ego_zone_m, now_m, zone_m)
         slow_mps = float(low_mps[row, vehicle])
-        margin_m = leader_margin(c, ahead_m - p.position_error_m, slow_mps, p)
+        margin_m = leader_margin(c.fastest, ahead_m - p.position_error_m, slow_mps, p)
         mps = float(high_mps[row, vehicle])
         top_mps = top_speed(limit_mps, mps, p)
         reaction_s, gap_m = p.reaction_s, p.follower_gap_m
@@ -114,7 +115,7 @@ def merging_margin(
             continue
         margin_m = max(
             margin_m,
-            follower_margin(c, behind_m, mps, top_mps, enter_s, reaction_s, gap_m, p),
+            follower_margin(c.slowest, behind_m, mps, top_mps, enter_s, reaction_s, gap_m, p),
         )
         if margin_m < 0.0:
             ahead_m -= p.position_error_m
@@ -128,7 +129,7 @@ def merging_margin(
 
 @kernel
 def hidden_margin(
-    s: Situations, row: int, lane: int, c: Course, enter_s: float, p: SafetyNumbers
+    s: Situations, row: int, lane: int, c: Motion, enter_s: float, p: SafetyNumbers
 ) -> float:
     """Return the room of what may hide on a merging lane: a follower that has not seen the ego.
 

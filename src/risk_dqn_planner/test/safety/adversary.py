@@ -3,7 +3,8 @@
 
 Everything that the assumptions leave open is up to the adversary: where vehicles begin and how
 fast, whether each brakes, keeps its speed or accelerates in every period, the errors of their
-measured speeds, where sight ends on each lane (it may also fall back), and what the policy inside
+measured speeds, where sight ends on each lane (it may also fall back), when within its range a
+decision takes effect and how hard the ego then accelerates and brakes, and what the policy inside
 the supervisor proposes. Populations of such worlds are bred for nearness to contact.
 """
 
@@ -38,7 +39,8 @@ class Worlds(NamedTuple):
     lengths along the lanes. near_m, far_m, back_m (R, M): how far a lane is seen before and
     after the ego has come to place turn_m (R,), growing by back_m a metre.
     lane (V,) of the vehicles; start_m, start_mps (R, V); drives (R, T, V): 0 brakes, 1 keeps its
-    speed, 2 accelerates; error (R, T, V) in [-1, 1]; proposes (R, T): actions.
+    speed, 2 accelerates; error (R, T, V) in [-1, 1]; proposes (R, T): actions. late, hard (R, T)
+    in [0, 1]: when decisions take effect, and how the ego accelerates and brakes, in their ranges.
     """
 
     ego_mps: Floats
@@ -53,6 +55,43 @@ class Worlds(NamedTuple):
     drives: Integers
     error: Floats
     proposes: Integers
+    late: Floats
+    hard: Floats
+
+
+class EgoRanges(NamedTuple):
+    """Between which values the ego's delay [s], acceleration and braking [m/s^2] lie."""
+
+    delay_s: tuple[float, float] = (0.0, 0.0)
+    up_mps2: tuple[float, float] = (UP, UP)
+    down_mps2: tuple[float, float] = (DOWN, DOWN)
+
+
+EXACT = EgoRanges()
+
+
+class EgoMotion(NamedTuple):
+    """One period: until late_s (R,) for one target (R,), then for another; rates (R,)."""
+
+    late_s: Floats
+    before_mps: Floats
+    target_mps: Floats
+    up: Floats
+    down: Floats
+
+    def after(self, time_s: float, mps: Floats) -> tuple[Floats, Floats]:
+        """Return the way covered and the speed (R,) after a time."""
+        first_s = np.minimum(time_s, self.late_s)
+        rest_s = time_s - first_s
+        way_m = distance_after(first_s, mps, self.before_mps, self.up, self.down)
+        then_mps = speed_after(first_s, mps, self.before_mps, self.up, self.down)
+        way_m = way_m + distance_after(rest_s, then_mps, self.target_mps, self.up, self.down)
+        return way_m, speed_after(rest_s, then_mps, self.target_mps, self.up, self.down)
+
+
+def within(bounds: tuple[float, float], share: Floats) -> Floats:
+    low, high = bounds
+    return low + (high - low) * share
 
 
 LANE_OF: NDArray[np.int64] = np.arange(VEHICLES) % LANES
@@ -92,6 +131,8 @@ def draw(rng: np.random.Generator, groups: int, each: int, *, brave: bool) -> Wo
         drives=rng.integers(0, 3, size),
         error=rng.uniform(-1.0, 1.0, size),
         proposes=np.full(size[:2], 2) if brave else rng.integers(0, 3, size[:2]),
+        late=rng.integers(0, 2, size[:2]).astype(np.float64),
+        hard=rng.integers(0, 2, size[:2]).astype(np.float64),
     )
 
 
@@ -114,11 +155,14 @@ def perceived(
     return s
 
 
-def nearness(w: Worlds, supervisor: Supervisor, error_mps: float = 0.0) -> Floats:
+def nearness(
+    w: Worlds, supervisor: Supervisor, error_mps: float = 0.0, ranges: EgoRanges = EXACT
+) -> Floats:
     """Drive all worlds; return how near each came to contact (R,): below 0 is a collision [m]."""
     rows = len(w.ego_mps)
     ego, mps, worst = np.zeros(rows), w.ego_mps.copy(), np.full(rows, np.inf)
     others = np.stack((w.start_m, w.start_mps), axis=1)
+    before = np.zeros(rows)
     proposals = supervisor.policy
     assert isinstance(proposals, Proposals)
     for t in range(PERIODS):
@@ -126,19 +170,22 @@ def nearness(w: Worlds, supervisor: Supervisor, error_mps: float = 0.0) -> Float
         s = perceived(w, t, ego, mps, others, error_mps)
         action = supervisor.decide(s, np.full(rows, t == 0)).action
         target = np.array([0.0, SLOW_MPS, FAST_MPS])[action]
+        late_s, hard = within(ranges.delay_s, w.late[:, t]), w.hard[:, t]
+        rates = within(ranges.up_mps2, hard), within(ranges.down_mps2, hard)
+        drive = EgoMotion(late_s, before, target, *rates)
         goal = np.where(w.drives[:, t] == BRAKES, 0.0, np.maximum(others[:, 1], LIMIT_MPS))
         goal = np.where(w.drives[:, t] == KEEPS, others[:, 1], goal)
         for k in range(1, SUBSTEPS + 1):
             time_s = PERIOD_S * k / SUBSTEPS
-            at_m = w.zone_m - ego[:, None] - distance_after(time_s, mps, target, UP, DOWN)[:, None]
+            at_m = w.zone_m - (ego + drive.after(time_s, mps)[0])[:, None]
             way_m = distance_after(time_s, others[:, 1], goal, OTHERS_UP, OTHERS_DOWN)
             apart_m = np.maximum(
                 (np.abs(at_m) - 0.5 * w.zone_l_m)[:, LANE_OF],
                 np.abs(others[:, 0] - way_m) - 0.5 * w.lane_l_m[:, LANE_OF],
             )
             worst = np.minimum(worst, apart_m.min(axis=1))
-        ego = ego + distance_after(PERIOD_S, mps, target, UP, DOWN)
-        mps = speed_after(PERIOD_S, mps, target, UP, DOWN)
+        moved_m, mps = drive.after(PERIOD_S, mps)
+        ego, before = ego + moved_m, target
         others[:, 0] -= way_m
         others[:, 1] = speed_after(PERIOD_S, others[:, 1], goal, OTHERS_UP, OTHERS_DOWN)
     return worst
@@ -168,6 +215,9 @@ def bred(rng: np.random.Generator, w: Worlds, near: Floats, each: int) -> Worlds
     shape = child.drives.shape
     child.drives[:] = np.where(some(shape, 0.15), rng.integers(0, 3, shape), child.drives)
     child.error[:] = np.where(some(shape, 0.15), rng.uniform(-1.0, 1.0, shape), child.error)
+    shape = child.late.shape
+    child.late[:] = np.where(some(shape, 0.15), rng.uniform(0.0, 1.0, shape), child.late)
+    child.hard[:] = np.where(some(shape, 0.15), rng.uniform(0.0, 1.0, shape), child.hard)
     if not (w.proposes == w.proposes[0, 0]).all():
         shape = child.proposes.shape
         child.proposes[:] = np.where(some(shape, 0.15), rng.integers(0, 3, shape), child.proposes)
@@ -183,6 +233,7 @@ def search(
     each: int = 32,
     brave: bool = True,
     error_mps: float = 0.0,
+    ranges: EgoRanges = EXACT,
 ) -> tuple[int, float]:
     """Return in how many groups of worlds a collision was found, and how near it came at all.
 
@@ -190,11 +241,11 @@ def search(
     """
     rng = np.random.default_rng(seed)
     w = draw(rng, groups, each, brave=brave)
-    near = nearness(w, supervisor, error_mps)
+    near = nearness(w, supervisor, error_mps, ranges)
     for _ in range(generations):
         if near.min() < 0.0:
             break
         w = bred(rng, w, near, each)
-        near = nearness(w, supervisor, error_mps)
+        near = nearness(w, supervisor, error_mps, ranges)
     nearest = near.reshape(groups, each).min(axis=1)
     return int((nearest < 0.0).sum()), float(nearest.min())

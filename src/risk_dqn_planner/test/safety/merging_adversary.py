@@ -3,12 +3,14 @@
 
 Vehicles on the merging lane do what they like, but for what is assumed of followers: once the
 ego has been in their lane and both in sight for the reaction time, they brake as hard as it takes
-to come to rest behind an ego that brakes. Places are relative to the join.
+to come to rest behind an ego that brakes. Places are relative to the join. The ego's delay and
+rates are up to the adversary, within their ranges.
 """
 
 from typing import NamedTuple
 
 import numpy as np
+from adversary import EXACT, EgoMotion, EgoRanges, within
 
 from risk_dqn_planner.policies.constant import ConstantPolicy
 from risk_dqn_planner.policies.supervised import Supervisor
@@ -17,7 +19,7 @@ from risk_dqn_planner.situation.situations import Floats, Integers, Situations, 
 
 VEHICLES, PERIODS, SUBSTEPS = 4, 30, 10
 STEP_S, PERIOD_S, LIMIT_MPS, REACTION_S, LENGTH_M = 0.05, 0.5, 7.0, 1.0, 4.0
-UP, DOWN, FAST_MPS, SLOW_MPS = 1.5, 3.5, 5.0, 1.0
+DOWN, FAST_MPS, SLOW_MPS = 3.5, 5.0, 1.0
 OTHERS_UP, GENTLE_MPS2, HARDEST_MPS2 = 2.0, 2.0, 8.0
 # Followers stop at least this far behind.
 KEPT_M = 0.3
@@ -28,7 +30,8 @@ class Merges(NamedTuple):
 
     seen_m (R,): how far upstream of its zone's centre the lane is seen. blocked_m (R,): centre of
     a crossing zone of 6 m in which someone stands for ever, infinity for none. start_m, start_mps
-    (R, V); drives (R, T, V): accelerations from -8 to 2; proposes (R, T).
+    (R, V); drives (R, T, V): accelerations from -8 to 2; proposes (R, T). late, hard (R, T): as in
+    `adversary.Worlds`.
     """
 
     ego_m: Floats
@@ -41,15 +44,18 @@ class Merges(NamedTuple):
     start_mps: Floats
     drives: Floats
     proposes: Integers
+    late: Floats
+    hard: Floats
 
 
-def draw(rng: np.random.Generator, rows: int, *, brave: bool) -> Merges:
-    """Draw worlds whose ego can still stop before the zone."""
+def draw(rng: np.random.Generator, rows: int, *, brave: bool, ranges: EgoRanges = EXACT) -> Merges:
+    """Draw worlds whose ego can still stop before the zone, once the first decision is in force."""
     zone_l_m, mps = rng.uniform(3.0, 8.0, rows), rng.uniform(0.0, 4.9, rows)
+    stops_m = ranges.delay_s[1] * mps + 0.5 * mps * mps / DOWN
     size = (rows, PERIODS)
     blocked = rng.random(rows) < 0.5
     return Merges(
-        ego_m=-zone_l_m - 0.5 * mps * mps / DOWN - rng.uniform(0.5, 8.0, rows),
+        ego_m=-zone_l_m - stops_m - rng.uniform(0.5, 8.0, rows),
         ego_mps=mps,
         zone_l_m=zone_l_m,
         lane_l_m=rng.uniform(3.0, 8.0, rows),
@@ -59,6 +65,8 @@ def draw(rng: np.random.Generator, rows: int, *, brave: bool) -> Merges:
         start_mps=rng.uniform(0.0, LIMIT_MPS, (rows, VEHICLES)),
         drives=rng.choice([-8.0, -2.0, 0.0, 2.0, 2.0], (*size, VEHICLES)),
         proposes=np.full(size, 2) if brave else rng.integers(0, 3, size),
+        late=rng.integers(0, 2, size).astype(np.float64),
+        hard=rng.integers(0, 2, size).astype(np.float64),
     )
 
 
@@ -81,17 +89,20 @@ def perceived(w: Merges, ego: Floats, mps: Floats, others: Floats, speeds: Float
     return s
 
 
-def wanted(free: Floats, gap_m: Floats, mps: Floats, ego_mps: Floats) -> Floats:
-    """The acceleration of followers that have reacted: what they like if it leaves them room."""
+def wanted(free: Floats, gap_m: Floats, mps: Floats, ego_mps: Floats, down: float) -> Floats:
+    """The acceleration of followers that have reacted: what they like if it leaves them room.
+
+    down: the ego's hardest braking, for which they are prepared.
+    """
     room_m = np.maximum(gap_m - KEPT_M, 1e-3)
-    stop = 0.5 * mps * mps / (room_m + 0.5 * ego_mps * ego_mps / DOWN)
+    stop = 0.5 * mps * mps / (room_m + 0.5 * ego_mps * ego_mps / down)
     closing = np.maximum(mps - ego_mps, 0.0)
     needed = np.maximum(stop, 0.5 * closing * closing / room_m)
     braking = -np.minimum(np.maximum(needed, GENTLE_MPS2), HARDEST_MPS2)
     return np.where(needed >= 0.8 * GENTLE_MPS2, np.minimum(braking, free), free)
 
 
-def nearness(w: Merges, supervisor: Supervisor) -> Floats:
+def nearness(w: Merges, supervisor: Supervisor, ranges: EgoRanges = EXACT) -> Floats:
     """Drive all worlds; return the least room between footprints in the lane (R,) [m].
 
     -1 where the ego has run into the blocked zone.
@@ -99,6 +110,7 @@ def nearness(w: Merges, supervisor: Supervisor) -> Floats:
     rows = len(w.ego_m)
     ego, mps = w.ego_m.copy(), w.ego_mps.copy()
     others, speeds = w.start_m.copy(), w.start_mps.copy()
+    before, hardest_mps2 = np.zeros(rows), ranges.down_mps2[1]
     known_s, worst = np.zeros(others.shape), np.full(rows, np.inf)
     for t in range(PERIODS):
         proposals = supervisor.policy
@@ -107,26 +119,30 @@ def nearness(w: Merges, supervisor: Supervisor) -> Floats:
         proposals.now = w.proposes[:, t]  # type: ignore[attr-defined]
         action = supervisor.decide(s, np.full(rows, t == 0)).action
         target = np.array([0.0, SLOW_MPS, FAST_MPS])[action]
-        for _ in range(SUBSTEPS):
+        late_s, hard = within(ranges.delay_s, w.late[:, t]), w.hard[:, t]
+        rates = within(ranges.up_mps2, hard), within(ranges.down_mps2, hard)
+        for k in range(SUBSTEPS):
+            drive = EgoMotion(np.clip(late_s - k * STEP_S, 0.0, STEP_S), before, target, *rates)
             entered = ego >= -w.zone_l_m
             seen = -0.5 * w.lane_l_m[:, None] - others < w.seen_m[:, None]
             known_s += np.where(entered[:, None] & seen, STEP_S, 0.0)
             gap_m = ego[:, None] - others - LENGTH_M
             follows = (known_s >= REACTION_S - 1e-9) & (gap_m > -LENGTH_M)
             free = w.drives[:, t]
-            rate = np.where(follows, wanted(free, gap_m, speeds, mps[:, None]), free)
+            rate = np.where(follows, wanted(free, gap_m, speeds, mps[:, None], hardest_mps2), free)
             goal = np.where(rate > 0.0, LIMIT_MPS, np.where(rate < 0.0, 0.0, speeds))
             up = np.where(rate > 0.0, rate, OTHERS_UP)
             down = np.where(rate < 0.0, -rate, HARDEST_MPS2)
             others += distance_after(STEP_S, speeds, goal, up, down)
             speeds = speed_after(STEP_S, speeds, goal, up, down)
-            ego = ego + distance_after(STEP_S, mps, target, UP, DOWN)
-            mps = speed_after(STEP_S, mps, target, UP, DOWN)
+            moved_m, mps = drive.after(STEP_S, mps)
+            ego = ego + moved_m
             outside = np.maximum(-w.zone_l_m[:, None] - ego[:, None], -w.lane_l_m[:, None] - others)
             room = np.abs(ego[:, None] - others) - LENGTH_M
             # Before the zone nothing can happen, and the adversary should not be content.
             worst = np.minimum(worst, np.where(outside < 0.0, room, 10.0 + outside).min(axis=1))
             worst = np.where(ego > w.blocked_m - 3.0, -1.0, worst)
+        before = target
     return worst
 
 
@@ -145,19 +161,28 @@ def bred(rng: np.random.Generator, w: Merges, near: Floats) -> Merges:
     fresh = rng.choice([-8.0, -2.0, 0.0, 2.0], shape)
     mutated = (rng.random(shape) < 0.15) & new[:, None, None]
     child.drives[:] = np.where(mutated, fresh, child.drives)
+    for share in (child.late, child.hard):
+        changed = (rng.random(share.shape) < 0.15) & new[:, None]
+        share[:] = np.where(changed, rng.uniform(0.0, 1.0, share.shape), share)
     return child
 
 
 def search(
-    supervisor: Supervisor, *, seed: int, generations: int, rows: int = 640, brave: bool = True
+    supervisor: Supervisor,
+    *,
+    seed: int,
+    generations: int,
+    rows: int = 640,
+    brave: bool = True,
+    ranges: EgoRanges = EXACT,
 ) -> float:
     """Return how near the adversary came: below 0 is a collision [m]."""
     rng = np.random.default_rng(seed)
-    w = draw(rng, rows, brave=brave)
-    near = nearness(w, supervisor)
+    w = draw(rng, rows, brave=brave, ranges=ranges)
+    near = nearness(w, supervisor, ranges)
     for _ in range(generations):
         if near.min() < 0.0:
             break
         w = bred(rng, w, near)
-        near = nearness(w, supervisor)
+        near = nearness(w, supervisor, ranges)
     return float(near.min())

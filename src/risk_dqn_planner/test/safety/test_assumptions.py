@@ -13,16 +13,17 @@ def test_every_parameter_says_what_it_is_and_its_default_lies_within_its_bounds(
     for field in dataclasses.fields(SafetyAssumptions):
         if field.default is dataclasses.MISSING:
             continue
-        assert field.metadata["description"].endswith("]") or field.name == "speed_limit_factor"
+        assert field.metadata["description"].endswith("]") or field.name.endswith("_factor")
         assert field.metadata["minimum"] <= field.default <= field.metadata["maximum"]
 
 
 def test_every_number_reaches_the_kernels() -> None:
-    plain = SafetyAssumptions()
+    plain = SafetyAssumptions(actuation_delay_s=0.3)
+    bounded_by_others = {"actuation_jitter_s": 0.1, "ego_braking_factor": 1.5}
     for field in dataclasses.fields(SafetyAssumptions):
         if field.default is not dataclasses.MISSING:
             low, high = field.metadata["minimum"], field.metadata["maximum"]
-            other = low if field.default == high else high
+            other = bounded_by_others.get(field.name, low if field.default == high else high)
             changed = dataclasses.replace(plain, **{field.name: other})
             assert changed.numbers() != plain.numbers(), field.name
 
@@ -42,6 +43,14 @@ def test_values_out_of_bounds_are_refused(changes: dict[str, Any]) -> None:
         SafetyAssumptions(**changes)
 
 
-def test_leaders_must_be_able_to_brake_as_hard_as_the_ego() -> None:
+def test_leaders_must_be_able_to_brake_as_hard_as_the_ego_ever_does() -> None:
+    with pytest.raises(ConfigurationError, match=r"leader_braking_mps2 is 8\.0.*10\.5"):
+        SafetyAssumptions(ego_braking_factor=3.0)
     with pytest.raises(ConfigurationError, match=r"leader_braking_mps2 is 3\.0.*3\.5"):
         SafetyAssumptions(leader_braking_mps2=3.0)
+
+
+@pytest.mark.parametrize(("delay_s", "jitter_s"), [(0.0, 0.1), (0.2, 0.3), (2.0, 0.6)])
+def test_jitter_is_part_of_the_delay_and_of_the_period(delay_s: float, jitter_s: float) -> None:
+    with pytest.raises(ConfigurationError, match="actuation_jitter_s is"):
+        SafetyAssumptions(actuation_delay_s=delay_s, actuation_jitter_s=jitter_s)

@@ -6,6 +6,7 @@ The worlds and the search are in adversary.py and merging_adversary.py.
 
 import importlib.util
 import sys
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 
@@ -72,6 +73,40 @@ def test_no_traffic_within_the_assumptions_makes_the_ego_collide(
     assert nearest_m < 0.5
 
 
+# A decision takes effect 0.1 to 0.4 s after the situation; the ego may brake like any leader.
+RANGES = adversary.EgoRanges((0.1, 0.4), (1.5, 2.5), (3.5, 8.0))
+RANGED = SafetyAssumptions(
+    actuation_delay_s=0.4,
+    actuation_jitter_s=0.3,
+    ego_acceleration_factor=2.5 / 1.5,
+    ego_braking_factor=8.0 / 3.5,
+)
+
+
+@pytest.mark.parametrize("brave", [True, False], ids=["fastest sound action", "any proposals"])
+def test_an_ego_that_is_not_exact_does_not_collide_within_its_ranges(brave: bool) -> None:
+    found, nearest_m = adversary.search(
+        supervisor(RANGED), seed=7, generations=30, brave=brave, ranges=RANGES
+    )
+    assert found == 0
+    assert nearest_m < 0.5
+
+
+@pytest.mark.parametrize(
+    "weak",
+    [
+        replace(RANGED, actuation_jitter_s=0.0),
+        replace(RANGED, ego_acceleration_factor=1.0),
+        replace(RANGED, ego_braking_factor=1.0),
+    ],
+    ids=["constant delay", "exact acceleration", "exact braking"],
+)
+def test_an_ego_taken_for_exact_that_is_not_lets_the_adversary_win(
+    weak: SafetyAssumptions,
+) -> None:
+    assert adversary.search(supervisor(weak), seed=8, generations=60, ranges=RANGES)[0] >= 1
+
+
 def test_conditions_for_each_lane_apart_let_the_adversary_win() -> None:
     weak = supervisor()
     weak._guard = EachLaneApart()
@@ -100,6 +135,14 @@ def test_without_a_supervisor_the_adversary_wins_everywhere() -> None:
 @pytest.mark.parametrize("brave", [True, False], ids=["fastest sound action", "any proposals"])
 def test_no_traffic_within_the_assumptions_hits_an_ego_that_merges(brave: bool) -> None:
     nearest_m = merging_adversary.search(supervisor(), seed=1, rows=320, generations=4, brave=brave)
+    assert 0.0 < nearest_m < 1.0
+
+
+@pytest.mark.parametrize("brave", [True, False], ids=["fastest sound action", "any proposals"])
+def test_nobody_hits_an_ego_that_merges_and_is_not_exact(brave: bool) -> None:
+    nearest_m = merging_adversary.search(
+        supervisor(RANGED), seed=1, generations=8, brave=brave, ranges=RANGES
+    )
     assert 0.0 < nearest_m < 1.0
 
 

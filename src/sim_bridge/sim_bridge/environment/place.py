@@ -116,5 +116,7 @@ def place_on(
         np.array([(point.x, point.y) for point in lanelet.polygon2d()])
         for lanelet in road_map.lanelet_map.laneletLayer
     )
-    model = build_intersection(road_map, route, IntersectionConfig(sensor_range_m=reach_m))
+    # Episodes end at the goal: nobody past it can be run into.
+    config = IntersectionConfig(sensor_range_m=reach_m, leaders_beyond_goal_m=0.0)
+    model = build_intersection(road_map, route, config)
     return Place(map_name, model, outlines)

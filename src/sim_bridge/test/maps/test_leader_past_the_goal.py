@@ -29,7 +29,8 @@ def at_goal_or_rest(model: IntersectionModel, leader_m: float) -> tuple[float, f
         ego = EgoPose(*line.position(s), line.heading_at(s), mps)
         decisions = policy.decide(builder.build(ego, leader, FULL_VIEW), np.array([restart]))
         restart = False
-        motion = (P.period_s, mps, target_of(decisions.action[0], P), P.ego_up_mps2, P.ego_down_mps2)
+        target_mps = target_of(decisions.action[0], P)
+        motion = (P.period_s, mps, target_mps, P.ego_up_mps2, P.ego_down_mps2)
         s, mps = s + float(distance_after(*motion)), float(speed_after(*motion))
         if s >= model.goal_m:
             break

@@ -139,19 +139,20 @@ def follow(
                     offer(cost_s + least_s, first, w.best)
                     break
                 note_critical(k, going, w.best)
-            stops_m = course.m2 + 0.5 * course.v2 * course.v2 / p.ego_down_mps2
+            motion = course.slowest
+            stops_m = motion.m2 + 0.5 * motion.v2 * motion.v2 / p.ego_down_mps2
             if k > 0 and stops_m > free_m - way_m:
                 periods, _ = vindicate(
                     w.ahead, k, course, w.arrival_s, w.who, w.known, last_m - way_m, merging, p
                 )
                 if periods == NO_MANOEUVRE:
                     continue
-            step_m = way_at(course, p.period_s, p)
+            step_m = way_at(motion, p.period_s)
             if way_m + step_m >= goal_m:
-                goal_s = k * p.period_s + time_at(course, goal_m - way_m, p)
+                goal_s = k * p.period_s + time_at(motion, goal_m - way_m)
                 offer(cost_s + goal_s, first, w.best)
             else:
-                step_mps = speed_at(course, p.period_s, p)
+                step_mps = speed_at(motion, p.period_s)
                 waits = places_ahead(way_m + step_m, w.places, places)
                 cost_s += waits * t.c.haste * p.period_s
                 node = Node(way_m + step_m, step_mps, cost_s, first, action)

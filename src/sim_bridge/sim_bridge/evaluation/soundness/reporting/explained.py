@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 
 from risk_dqn_planner.decision import Action
 from risk_dqn_planner.safety.assumptions import SafetyAssumptions
-from risk_dqn_planner.safety.course import BRAKE, GO, Course, begin_course, way_at, with_manoeuvre
+from risk_dqn_planner.safety.course import BRAKE, GO, Motion, begin_course, way_at, with_manoeuvre
 from risk_dqn_planner.safety.joint_check import NO_MANOEUVRE, joint_check, target_of
 from risk_dqn_planner.safety.known import at_first_sight
 from risk_dqn_planner.safety.others import earliest_arrivals
@@ -52,10 +52,11 @@ def _situation(lanes: Sequence[_Lane], ego_mps: float) -> Situations:
     return s
 
 
-def _course(ego_mps: float, action: Action, periods: int) -> Course:
+def _course(ego_mps: float, action: Action, periods: int) -> Motion:
     p = _ASSUMPTIONS.numbers()
-    course: Course = begin_course(ego_mps, 0.0, target_of(int(action), p), p)
-    return course if periods == GO else with_manoeuvre(course, periods, p)
+    course = begin_course(ego_mps, 0.0, target_of(int(action), p), p)
+    motion: Motion = with_manoeuvre(course, periods, p).slowest
+    return motion
 
 
 def _arrivals(s: Situations) -> Floats:
@@ -83,10 +84,9 @@ def _zones(axes: Axes, s: Situations) -> None:
         )  # fmt: skip
 
 
-def _drive(axes: Axes, course: Course, label: str, color: str, style: str = "-") -> None:
+def _drive(axes: Axes, course: Motion, label: str, color: str, style: str = "-") -> None:
     time_s = np.linspace(0.0, _LATEST_S, 200)
-    p = _ASSUMPTIONS.numbers()
-    way_m = [way_at(course, float(t), p) for t in time_s]
+    way_m = [way_at(course, float(t)) for t in time_s]
     axes.plot(time_s, way_m, color=color, linestyle=style, linewidth=2.2, label=label)
 
 
@@ -177,7 +177,7 @@ def _leaves_in_time(s: Situations) -> bool:
     """Tell whether an ego at rest that goes leaves all zones before anyone may arrive."""
     p = _ASSUMPTIONS.numbers()
     course = _course(0.0, Action.FAST, GO)
-    way_m = [way_at(course, max(float(t) - p.safe_gap_s, 0.0), p) for t in _arrivals(s)]
+    way_m = [way_at(course, max(float(t) - p.safe_gap_s, 0.0)) for t in _arrivals(s)]
     return bool(np.all(way_m >= s.lane_ego_distance_m[0] + 0.5 * _ZONE_M))
 
 

@@ -10,6 +10,7 @@ from risk_dqn_planner.ros.adapters.kinds import ObjectsAdapter
 from risk_dqn_planner.ros.parameters import EgoParameters, MapParameters
 from risk_dqn_planner.ros.streams import SECOND_NS
 from risk_dqn_planner.ros.synchroniser import Frame
+from risk_dqn_planner.situation.ego import carried_on
 from risk_dqn_planner.situation.inputs import Perception
 from risk_dqn_planner.situation.pipeline import Route, SituationPipeline
 from risk_dqn_planner.situation.plausibility import Plausibility
@@ -65,6 +66,9 @@ class Evaluation:
             )
             odometry_ns = conversions.to_ns(frame.odometry.header.stamp)
             self.plausibility.check(seen, odometry_ns / SECOND_NS, frame.stamp_ns / SECOND_NS)
+            later_s = (frame.stamp_ns - odometry_ns) / SECOND_NS
+            if later_s:
+                seen = seen._replace(ego=carried_on(seen.ego, later_s))
             return self.pipeline.report(frame.stamp_ns, seen), seen
         except PlannerError as error:
             return self.fault(fault_of(frame.stamp_ns, error)), None

@@ -2,15 +2,18 @@
 """Which inputs belong together: plain Python, so that it is tested without ROS 2.
 
 Objects set the pace. Once a list of objects has arrived it waits until odometry and visible area
-are as new as itself, but no longer than a timeout on the steady clock; then the newest there is
-serves, unless it is too old. Ages are differences of stamps, never times of arrival, so the same
-frames come out with a clock that stands still, jumps from tick to tick, or runs fast.
+are as new as itself, but no longer than a timeout on the steady clock. Of what has come by then the
+odometry nearest in time serves, and the newest visible area that is not newer than the objects:
+one that is may show a place free for somebody who was hidden when the objects were perceived. Ages
+are differences of stamps, never times of arrival, so the same frames come out with a clock that
+stands still, jumps from tick to tick, or runs fast.
 """
 
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
-from risk_dqn_planner.ros.streams import SECOND_NS, AgeLimits, Stream
+from risk_dqn_planner.ros.backlog import Backlog
+from risk_dqn_planner.ros.streams import SECOND_NS, AgeLimits, Stamped, Stream
 from risk_dqn_planner.situation.report import Fault, FaultyInput, Status
 from risk_dqn_planner.vehicle import require_positive
 
@@ -46,11 +49,12 @@ class Frame(NamedTuple):
 
 
 class Synchroniser:
-    """Holds the newest message of each input and hands out frames."""
+    """Holds the newest messages of each input and hands out frames."""
 
     def __init__(self, config: SynchroniserConfig, ages: AgeLimits) -> None:
         self._timeout_ns = 0
         self.streams = {source: Stream(source, ages) for source in INPUTS}
+        self._backlogs = _new_backlogs()
         self.reconfigure(config, ages)
         self._deadline_ns: int | None = None  # on the steady clock; None if no objects wait
         self._event: Fault | None = None  # what a message was wrong with, until it is told
@@ -70,6 +74,9 @@ class Synchroniser:
         """
         fault = self.streams[source].receive(stamp_ns, message, now_ns, steady_ns)
         self._event = fault or self._event
+        backlog = self._backlogs.get(source)
+        if backlog is not None:
+            backlog.add(Stamped(stamp_ns, message), self.streams[source].limits.max_age_ns)
         if source is FaultyInput.OBJECTS and self._deadline_ns is None:
             # Later lists do not put the deadline off, or a late input would stall everything.
             self._deadline_ns = steady_ns + self._timeout_ns
@@ -92,7 +99,25 @@ class Synchroniser:
         late = self._overdue(max(stamp_ns, now_ns), now_ns, steady_ns)
         if late is not None:
             return self._told(late._replace(stamp_ns=stamp_ns), now_ns)
-        return Frame(stamp_ns, *(one.message for one in newest if one is not None))
+        due = self._frame(objects)
+        return self._told(due, now_ns) if isinstance(due, Fault) else due
+
+    def _frame(self, objects: Stamped) -> Frame | Fault:
+        """Return what belongs to objects, or what is missing or too old beside them."""
+        stamp_ns, source = objects.stamp_ns, FaultyInput.VISIBLE_AREA
+        odometry = self._backlogs[FaultyInput.ODOMETRY].nearest(stamp_ns)
+        area = self._backlogs[source].up_to(stamp_ns)
+        if area is None or odometry is None:
+            text = f"no {source} of the objects' time or before received yet"
+            return Fault(stamp_ns, Status.MISSING_INPUT, source, text)
+        age_ns, limits = stamp_ns - area.stamp_ns, self.streams[source].limits
+        if age_ns > limits.max_age_ns:
+            text = (
+                f"the last {source} before the objects is {age_ns / SECOND_NS:.2f} s older, "
+                f"expected at most {limits.max_input_age_s:g} s"
+            )
+            return Fault(stamp_ns, Status.STALE_INPUT, source, text)
+        return Frame(stamp_ns, odometry.message, area.message, objects.message)
 
     def overdue(self, now_ns: int, steady_ns: int) -> Fault | None:
         """Return what is missing, too old or ahead by the clock of the stamps."""
@@ -102,12 +127,16 @@ class Synchroniser:
         """Forget every message."""
         for source, stream in self.streams.items():
             self.streams[source] = Stream(source, stream.limits)
+        self._backlogs = _new_backlogs()
         self._event = self._deadline_ns = None
 
     def clock_went_back(self, now_ns: int) -> None:
         """Forget what is of a time that has not come yet."""
-        for stream in self.streams.values():
-            stream.forget_later_than(now_ns + stream.limits.max_age_ns)
+        for source, stream in self.streams.items():
+            latest_ns = now_ns + stream.limits.max_age_ns
+            stream.forget_later_than(latest_ns)
+            if source in self._backlogs:
+                self._backlogs[source].forget_later_than(latest_ns)
         self._event = None
         if self.streams[FaultyInput.OBJECTS].newest is None:
             self._deadline_ns = None
@@ -126,3 +155,8 @@ class Synchroniser:
             self.streams[source].overdue(reference_ns, now_ns, steady_ns) for source in INPUTS
         )
         return next((fault for fault in faults if fault is not None), None)
+
+
+def _new_backlogs() -> dict[FaultyInput, Backlog]:
+    """Return what is kept beside the newest messages, of inputs that objects choose from."""
+    return {FaultyInput.ODOMETRY: Backlog(), FaultyInput.VISIBLE_AREA: Backlog()}

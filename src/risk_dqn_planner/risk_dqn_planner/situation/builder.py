@@ -33,9 +33,11 @@ class SituationBuilder:
         self.model = model
         self.config = config or SituationConfig()
         self._table = path_table(model)
+        limits = np.array([lane.speed_limit_mps for lane in model.lanes])
+        self._hidden_mps = limits * self.config.tracking.speed_factor
+        self._exit_m = np.array([-0.5 * lane.zone_length_m for lane in model.lanes])
         self.memory: LaneMemory | None = None
         if self.config.memory == TRACKED:
-            limits = np.array([lane.speed_limit_mps for lane in model.lanes])
             self.memory = LaneMemory(self._table, limits, self.config)
 
     def build(
@@ -49,9 +51,10 @@ class SituationBuilder:
         """Return the situation as a batch of one, vehicles ordered by (id, lane).
 
         visible_area: simple polygon (K, 2) in the map frame. An object whose centre lies in the
-        ego's footprint is the ego itself and is left out. The memory alone asks for
-        visible_area_age_s, how much older than the objects the area is, and time_s, when the
-        objects were perceived, on any clock; without a time nothing is remembered.
+        ego's footprint is the ego itself and is left out. visible_area_age_s: how much older than
+        the objects the area is; whoever was hidden then may have come on since. The memory alone
+        asks for time_s, when the objects were perceived, on any clock; without a time nothing is
+        remembered.
 
         Raises:
             InputError: an input is not finite or not plausible; names which.
@@ -82,12 +85,15 @@ class SituationBuilder:
         """Return d_o (M,): how near a hidden vehicle may be, by memory or as the ego sees now."""
         if self.memory is not None:
             return self.memory.look(look)
-        return hidden_distances_kernel(
+        hidden_m: Floats = hidden_distances_kernel(
             self._table,
             len(self.model.lanes),
             np.ascontiguousarray(look.visible_area, dtype=np.float64),
             self.config.sensor_range_m,
         )
+        come_on_m = self._hidden_mps * abs(look.visible_area_age_s)
+        nearest_m: Floats = np.maximum(hidden_m - come_on_m, self._exit_m)
+        return nearest_m
 
     def _with_vehicles(self, ego: EgoPose, objects: ObjectArrays) -> Situations:
         config = self.config

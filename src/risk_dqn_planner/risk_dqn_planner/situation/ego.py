@@ -44,5 +44,14 @@ def ego_progress(model: IntersectionModel, ego: EgoPose, config: SituationConfig
     return s
 
 
+def carried_on(ego: EgoPose, time_s: float) -> EgoPose:
+    """Return the ego a time later, or earlier if it is below 0: straight on at its speed."""
+    way_m = ego.speed_mps * time_s
+    return ego._replace(
+        x_m=ego.x_m + way_m * math.cos(ego.heading_rad),
+        y_m=ego.y_m + way_m * math.sin(ego.heading_rad),
+    )
+
+
 def _metres(length_m: float) -> str:
     return f"{length_m:.1f} m" if length_m < 1e6 else f"{length_m:.1e} m"

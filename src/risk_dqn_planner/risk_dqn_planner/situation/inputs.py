@@ -42,7 +42,7 @@ class ObjectArrays(NamedTuple):
 class Perception(NamedTuple):
     """What is perceived at one time, that of the objects; visible_area a simple polygon (K, 2) [m].
 
-    visible_area_age_s: how much older than the objects the area is; negative if newer.
+    visible_area_age_s: how much older than the objects the area is.
     """
 
     ego: EgoPose

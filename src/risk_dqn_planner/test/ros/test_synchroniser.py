@@ -4,7 +4,8 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from risk_dqn_planner.ros.streams import AgeLimits
+from risk_dqn_planner.ros.backlog import Backlog
+from risk_dqn_planner.ros.streams import AgeLimits, Stamped
 from risk_dqn_planner.ros.synchroniser import INPUTS, Frame, Synchroniser, SynchroniserConfig
 from risk_dqn_planner.situation.report import Fault, FaultyInput, Status
 
@@ -74,6 +75,61 @@ def test_after_the_timeout_the_newest_there_is_serves() -> None:
     assert take(sync, steady_ms=7050) == frame(100, 60, 40)
 
 
+def test_of_inputs_that_went_on_those_that_belong_to_the_objects_serve() -> None:
+    sync = synchroniser()
+    for stamp_ms in range(0, 300, 20):
+        give(sync, ODOMETRY, stamp_ms)
+    for stamp_ms in range(30, 300, 50):
+        give(sync, AREA, stamp_ms)
+    give(sync, OBJECTS, 109)
+    # The nearest odometry; an area that is newer than the objects shows too much.
+    assert take(sync) == frame(109, 100, 80)
+    give(sync, OBJECTS, 131)
+    assert take(sync) == frame(131, 140, 130)
+
+
+def test_an_area_that_is_newer_than_the_objects_does_not_serve_them() -> None:
+    sync = synchroniser()
+    give(sync, ODOMETRY, 100)
+    give(sync, AREA, 110)
+    give(sync, OBJECTS, 100)
+    assert take(sync) == Fault(
+        100 * MS,
+        Status.MISSING_INPUT,
+        FaultyInput.VISIBLE_AREA,
+        "no visible area of the objects' time or before received yet",
+    )
+    give(sync, OBJECTS, 120)
+    assert take(sync, steady_ms=50) == frame(120, 100, 110)
+
+
+def test_an_area_that_is_too_old_for_the_objects_is_a_fault_also_once_the_next_has_come() -> None:
+    sync = synchroniser()
+    give(sync, AREA, 100)
+    give(sync, AREA, 1100)
+    give(sync, ODOMETRY, 1000)
+    give(sync, OBJECTS, 1000)
+    assert take(sync) == Fault(
+        1000 * MS,
+        Status.STALE_INPUT,
+        FaultyInput.VISIBLE_AREA,
+        "the last visible area before the objects is 0.90 s older, expected at most 0.5 s",
+    )
+
+
+def test_what_is_too_old_for_any_objects_is_not_kept() -> None:
+    backlog = Backlog()
+    for stamp_ns in range(0, 10_000, 10):
+        backlog.add(Stamped(stamp_ns, None), max_age_ns=100)
+    # Ten that are not too old, one more in case that all of them are too new, and the newest.
+    assert len(backlog._messages) == 11
+    assert backlog.up_to(9_889) is None
+    backlog.forget_later_than(9_935)
+    assert backlog.nearest(10_000) == Stamped(9_930, None)
+    backlog.forget_later_than(0)
+    assert backlog.nearest(10_000) is None
+
+
 def test_objects_that_keep_coming_do_not_put_the_deadline_off() -> None:
     sync = synchroniser()
     give(sync, ODOMETRY, 0)
@@ -122,8 +178,8 @@ def test_stamps_that_fall_are_a_fault_once_and_then_the_new_time_counts() -> Non
         FaultyInput.OBJECTS,
         "objects went back in time by 0.100 s, expected rising stamps",
     )
-    give(sync, OBJECTS, 950)
-    assert take(sync) == frame(950, 1000, 1000)
+    give(sync, OBJECTS, 1010)
+    assert take(sync, steady_ms=50) == frame(1010, 1000, 1000)
 
 
 def test_a_late_odometry_is_a_fault_even_though_the_objects_are_in_order() -> None:
@@ -273,3 +329,4 @@ def test_a_frame_never_holds_an_input_older_than_allowed(
             for message in (due.odometry, due.visible_area):
                 assert isinstance(message, int)
                 assert message >= due.stamp_ns // MS - 500
+            assert due.visible_area <= due.objects

@@ -34,6 +34,7 @@ from risk_dqn_planner.ros.parameters import EgoParameters, MapParameters
 from risk_dqn_planner.ros.situation_records import SituationRecords, read_situation
 from risk_dqn_planner.ros.synchroniser import Frame
 from risk_dqn_planner.situation.config import SituationConfig
+from risk_dqn_planner.situation.inputs import object_arrays
 from risk_dqn_planner.situation.pipeline import SituationPipeline
 from risk_dqn_planner.situation.plausibility import Plausibility
 from risk_dqn_planner.situation.report import SituationReport
@@ -129,6 +130,21 @@ def test_a_route_whose_model_fails_for_a_reason_of_our_own_is_a_fault() -> None:
     assert (report.status, report.source) == (Status.INTERNAL_ERROR, FaultyInput.ROUTE)
     assert "of our own" in report.text
     assert "Traceback" in complaints[0]
+
+
+@pytest.mark.parametrize(("older_ms", "expected_m"), [(0, 20.0), (200, 19.2), (-50, 20.2)])
+def test_an_ego_of_another_time_than_the_objects_is_taken_to_drive_on(
+    older_ms: int, expected_m: float
+) -> None:
+    made = evaluation("instantaneous", [])
+    ego = conversions.EgoPose(-20.0, 0.0, 0.0, 4.0)
+    odometry = conversions.ego_to_message(ego, (1000 - older_ms) * MS)
+    area = conversions.area_to_message(square(40.0), 1000 * MS)
+    objects = conversions.objects_to_message(object_arrays(), 1000 * MS)
+    received = conversions.read_area.of(area), conversions.read_objects.of(objects)
+    report, _ = made.report(Frame(1000 * MS, odometry, *received))
+    assert report.situations is not None
+    assert report.situations.lane_ego_distance_m[0, 0] == pytest.approx(expected_m)
 
 
 def stamped(message: Message, stamp_ns: int) -> Message:

@@ -152,3 +152,13 @@ def test_an_old_visible_area_tells_less() -> None:
     pipeline = remembering()
     old = HIDDEN_FROM_20_M._replace(visible_area_age_s=0.3)
     assert hidden_m(pipeline, 0.0, old) == pytest.approx(17.9)
+
+
+def test_without_a_memory_as_well() -> None:
+    pipeline = SituationPipeline(lambda _: crossing_model())
+    pipeline.select((10,))
+    old = HIDDEN_FROM_20_M._replace(visible_area_age_s=0.3)
+    assert hidden_m(pipeline, 0.0, old) == pytest.approx(17.9)
+    # Whoever was hidden just before the zone may have come into it, and not further than its exit.
+    unseen = HIDDEN_FROM_20_M._replace(visible_area=square(4.0), visible_area_age_s=5.0)
+    assert hidden_m(pipeline, 0.0, unseen) == pytest.approx(-3.0)

@@ -56,7 +56,8 @@ class DeciderConfig:
     max_repeat_s: float = field(
         default=0.25,
         metadata={
-            "description": "A situation that was decided on longer ago is frozen: Stop [s]",
+            "description": "A situation that was decided on longer ago, or more than half a "
+            "period, is frozen: Stop [s]",
             "minimum": 0.0,
             "maximum": 10.0,
             "live": True,

@@ -140,7 +140,8 @@ class PolicyParameters:
         default=2.0,
         metadata={
             "description": "Decisions a second; learned policies are trained for 2, and the "
-            "joint check reckons with the period that follows [Hz]",
+            "joint check reckons with the period that follows; no more than "
+            "rates.situation.min_rate_hz [Hz]",
             "minimum": 0.1,
             "maximum": 20.0,
         },

@@ -90,6 +90,7 @@ class PolicyNode(ManagedNode):
     def configure(self) -> None:
         """Load the policy and let it decide twice, so that the first real decision is not late."""
         settings = self.declared.read(PolicyParameters)
+        _require_situations_for(settings.rate_hz, self.declared.read(SituationRates, RATES))
         assumptions = read_assumptions(self.declared, settings.rate_hz)
         config = self.declared.read(DeciderConfig)
         self.declared.read(ClockParameters)
@@ -121,7 +122,11 @@ class PolicyNode(ManagedNode):
         settings = self.declared.read(PolicyParameters)
         config = self.declared.read(DeciderConfig)
         lead_s = allowed_lead_s(self, config.max_situation_ahead_s)
-        self._decider.reconfigure(replace(config, max_situation_ahead_s=lead_s))
+        # What was decided is checked for one period: it does not serve the next decision as well.
+        repeat_s = min(config.max_repeat_s, 0.5 / settings.rate_hz)
+        self._decider.reconfigure(
+            replace(config, max_situation_ahead_s=lead_s, max_repeat_s=repeat_s)
+        )
         self._ticker.clock_timeout_s = self.declared.read(StandingClockParameters).clock_timeout_s
         self._output.marker_frame = settings.marker_frame
         self._output.rates = self.declared.read(SituationRates, RATES)
@@ -217,6 +222,15 @@ def _internal(error: Exception) -> str:
 def _stand_in(name: str, reason: Reason, source: FaultyInput, text: str) -> Decider:
     stand_in = UnusablePolicy(name, text, reason=reason, source=source)
     return Decider(stand_in, explain, DeciderConfig())
+
+
+def _require_situations_for(rate_hz: float, rates: SituationRates) -> None:
+    """Raise ConfigurationError unless each decision may have a situation of its own."""
+    if rate_hz > rates.situation.min_rate_hz:
+        raise ConfigurationError(
+            f"rate_hz is {rate_hz:g}, expected at most rates.situation.min_rate_hz "
+            f"({rates.situation.min_rate_hz:g}): each decision needs a new situation"
+        )
 
 
 def _load(settings: PolicyParameters, assumptions: SafetyAssumptions, explains: Explain) -> Policy:

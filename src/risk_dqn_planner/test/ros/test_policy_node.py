@@ -12,6 +12,7 @@ from intersection_msgs.msg import Decision, Situation
 from rclpy.serialization import serialize_message
 
 from risk_dqn_planner.decision import Reason, fault_decision
+from risk_dqn_planner.errors import ConfigurationError
 from risk_dqn_planner.ros import conversions
 from risk_dqn_planner.ros.decider import Choice
 from risk_dqn_planner.ros.main import run_managed
@@ -90,3 +91,28 @@ def test_a_node_that_ends_already_is_not_disturbed_by_being_asked_to(
     finally:
         for each, handler in before.items():
             signal.signal(each, handler)
+
+
+def test_decisions_more_frequent_than_situations_are_refused() -> None:
+    rclpy.init(args=["--ros-args", "-p", "autostart:=false", "-p", "rate_hz:=5.0"])
+    node = PolicyNode()
+    try:
+        with pytest.raises(ConfigurationError, match=r"rate_hz is 5, .*min_rate_hz \(4\)"):
+            node.configure()
+    finally:
+        node.destroy_node()
+        rclpy.try_shutdown()
+
+
+@pytest.mark.parametrize(("rate_hz", "expected_s"), [(2.0, 0.25), (4.0, 0.125)])
+def test_what_was_decided_on_one_situation_serves_for_half_a_period_at_most(
+    rate_hz: float, expected_s: float
+) -> None:
+    rclpy.init(args=["--ros-args", "-p", "autostart:=false", "-p", f"rate_hz:={rate_hz}"])
+    node = PolicyNode()
+    try:
+        node.configure()
+        assert node._decider.config.max_repeat_s == expected_s
+    finally:
+        node.destroy_node()
+        rclpy.try_shutdown()

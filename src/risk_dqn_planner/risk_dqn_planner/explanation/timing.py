@@ -13,12 +13,13 @@ from risk_dqn_planner.compiled import allocating_kernel
 from risk_dqn_planner.explanation.answer import NOBODY, Pair
 from risk_dqn_planner.policies.base import Action
 from risk_dqn_planner.policies.rule_based import RuleBasedConfig
-from risk_dqn_planner.risk.rewards import leader_gap, reach_time
+from risk_dqn_planner.risk.rewards import reach_time
 from risk_dqn_planner.safety.assumptions import NO_CAP_MPS, SafetyAssumptions, SafetyNumbers
 from risk_dqn_planner.safety.course import BRAKE, GO, begin_course, time_at, with_manoeuvre
 from risk_dqn_planner.safety.joint_check import NO_MANOEUVRE, target_of
 from risk_dqn_planner.safety.merging import leader_margin
 from risk_dqn_planner.safety.others import hidden_arrival, hidden_speed, vehicle_arrival
+from risk_dqn_planner.situation.common_path import leader_gap
 from risk_dqn_planner.situation.situations import Floats, Situations
 
 

@@ -17,8 +17,9 @@ import numpy as np
 from risk_dqn_planner.compiled import allocating_kernel, kernel
 from risk_dqn_planner.risk.config import RiskConfig, RiskParameters
 from risk_dqn_planner.risk.motion import distance_after, speed_after
-from risk_dqn_planner.risk.rewards import leader_gap, leader_reward, safe_leave_reward
+from risk_dqn_planner.risk.rewards import leader_reward, safe_leave_reward
 from risk_dqn_planner.risk.worst_case import Work, foresee_ego, foresee_others, work_memory
+from risk_dqn_planner.situation.common_path import leader_gap
 from risk_dqn_planner.situation.situations import Floats, Integers, Situations
 
 __all__ = ["ActionRewards", "RiskAssessment", "RiskConfig", "assess", "predict_actions"]

@@ -9,11 +9,11 @@ behind which the ego comes to rest, or if it is a follower that has room to reac
 import math
 
 from risk_dqn_planner.compiled import kernel
-from risk_dqn_planner.risk.rewards import leader_gap
 from risk_dqn_planner.safety.assumptions import SafetyNumbers
 from risk_dqn_planner.safety.course import Course, Motion, speed_at, time_at, way_at
 from risk_dqn_planner.safety.known import Known
 from risk_dqn_planner.safety.others import advance, hidden_speed, top_speed
+from risk_dqn_planner.situation.common_path import leader_gap
 from risk_dqn_planner.situation.situations import Situations
 
 

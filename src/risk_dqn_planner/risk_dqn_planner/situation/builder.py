@@ -15,6 +15,7 @@ from risk_dqn_planner.situation.inputs import (
     check_objects,
     check_visible_area,
 )
+from risk_dqn_planner.situation.long_vehicles import nearest_ends
 from risk_dqn_planner.situation.matching import in_footprint_kernel, match_kernel
 from risk_dqn_planner.situation.memory import LaneMemory, Look
 from risk_dqn_planner.situation.occlusion import hidden_distances_kernel
@@ -65,7 +66,7 @@ class SituationBuilder:
         check_visible_area(visible_area)
         ego_s = ego_progress(self.model, ego, self.config)
         lanes = self.model.lanes
-        filled = self._with_vehicles(ego, objects)
+        filled = self._with_vehicles(ego, ego_s, objects)
         look = Look(time_s, ego, filled, visible_area, visible_area_age_s)
         return filled._replace(
             stop_line_distance_m=np.array([self.model.stop_line.position_m - ego_s]),
@@ -95,11 +96,17 @@ class SituationBuilder:
         nearest_m: Floats = np.maximum(hidden_m - come_on_m, self._exit_m)
         return nearest_m
 
-    def _with_vehicles(self, ego: EgoPose, objects: ObjectArrays) -> Situations:
+    def _with_vehicles(self, ego: EgoPose, ego_s: float, objects: ObjectArrays) -> Situations:
         config = self.config
         who, lane, distance, speed = match_kernel(
-            self._table, objects, config.lateral_tolerance_m, config.max_heading_difference_rad
+            self._table,
+            objects,
+            config.lateral_tolerance_m,
+            config.max_heading_difference_rad,
+            self.model.traffic_dimensions.length_m,
+            config.position_error_m,
         )
+        distance = nearest_ends(self.model, ego_s, lane, distance, objects.length_m[who])
         kept = [k for k, i in enumerate(who) if not self._is_ego(ego, objects, i)]
         order = np.array(sorted(kept, key=lambda k: (objects.id[who[k]], lane[k])), dtype=np.int64)
         # At least one place, so that nobody has to think of arrays without entries.

@@ -108,6 +108,15 @@ class SituationConfig:
             "maximum": math.pi / 2,
         },
     )
+    position_error_m: float = field(
+        default=0.0,
+        metadata={
+            "description": "Perceived places along lanes are off by no more than this: nobody has "
+            "left a zone before; as safety.position_error_m of the policy node [m]",
+            "minimum": 0.0,
+            "maximum": 20.0,
+        },
+    )
     max_ego_offset_m: float = field(
         default=2.0,
         metadata={
@@ -134,7 +143,12 @@ class SituationConfig:
     tracking: TrackingConfig = field(default_factory=TrackingConfig)
 
     def __post_init__(self) -> None:
-        require_positive(self, skip=("memory", "tracking"))
+        require_positive(self, skip=("memory", "tracking", "position_error_m"))
+        if not 0.0 <= self.position_error_m < math.inf:
+            raise ConfigurationError(
+                f"SituationConfig.position_error_m is {self.position_error_m}, expected a finite "
+                "number, 0 or more"
+            )
         require_memory(self.memory)
         if self.max_heading_difference_rad > math.pi / 2:
             raise ConfigurationError(

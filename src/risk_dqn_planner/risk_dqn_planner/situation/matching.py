@@ -34,12 +34,19 @@ def in_footprint_kernel(
 
 @kernel
 def distance_on_path_kernel(
-    table: PathTable, p: int, x: float, y: float, heading: float, tolerance: float, turn: float
+    table: PathTable,
+    p: int,
+    x: float,
+    y: float,
+    heading: float,
+    tolerance: float,
+    turn: float,
+    beyond: float,
 ) -> tuple[float, float]:
     """Return (distance to the zone's centre, lane heading), or infinity if not on path p.
 
-    On the path means: the centre within the lane's half width plus `tolerance` [m], the
-    heading within `turn` [rad], between the path's start and where it ceases to matter.
+    On the path means: the centre within the lane's half width plus `tolerance` [m], the heading
+    within `turn` [rad], between the path's start and `beyond` [m] where vehicles cease to matter.
     """
     reach = table.half_width_m[p] + tolerance
     if x < table.box[p, 0] - reach or x > table.box[p, 2] + reach:
@@ -50,20 +57,26 @@ def distance_on_path_kernel(
     s, lateral, along = project_kernel(table.xy[begin:end], table.s[begin:end], x, y, heading, turn)
     # Written so that not-a-number is on no path.
     near = abs(lateral) <= reach and turned_by_kernel(heading, along) <= turn + 1e-9
-    if near and s >= 0.0 and s <= table.end_m[p]:
+    if near and s >= 0.0 and s <= table.end_m[p] + beyond:
         return table.zone_center_m[p] - s, along
     return NOT_ON_PATH, 0.0
 
 
 @allocating_kernel
 def match_kernel(
-    table: PathTable, objects: ObjectArrays, tolerance: float, turn: float
+    table: PathTable,
+    objects: ObjectArrays,
+    tolerance: float,
+    turn: float,
+    usual_length: float,
+    position_error: float,
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
     """Return the C (vehicle, lane) pairs, in the order of the objects and then of the lanes.
 
     object index (C,), lane index (C,), distance to the zone's centre (C,) [m] and speed along
     the lane (C,) [m/s]. A vehicle that fits several ways through one lane counts once, on the
-    way that brings it to the zone first.
+    way that brings it to the zone first. It counts until its rear has left the zone, also if its
+    place is off by `position_error` [m] or it is longer than `usual_length` [m].
     """
     count = objects.x_m.shape[0]
     paths = table.lane.shape[0]
@@ -76,9 +89,10 @@ def match_kernel(
     for i in range(count):
         first_of_object = used
         heading = objects.heading_rad[i]
+        beyond = position_error + max(0.5 * (objects.length_m[i] - usual_length), 0.0)
         for p in range(paths):
             d, along = distance_on_path_kernel(
-                table, p, objects.x_m[i], objects.y_m[i], heading, tolerance, turn
+                table, p, objects.x_m[i], objects.y_m[i], heading, tolerance, turn, beyond
             )
             if d == NOT_ON_PATH:
                 continue

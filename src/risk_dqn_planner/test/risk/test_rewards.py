@@ -9,13 +9,13 @@ from hypothesis import strategies as st
 
 from risk_dqn_planner.risk.rewards import (
     gap_reward,
-    leader_gap,
     leader_reward,
     leave_time,
     reach_time,
     safe_leave_reward,
     safe_stop_reward,
 )
+from risk_dqn_planner.situation.common_path import leader_gap
 
 
 def stop_reward(ego_m: float, line_m: float, speed: float = 0.0, zone: float = 6.0) -> float:

@@ -30,7 +30,7 @@ Match = tuple[int, int, Any, Any]
 
 
 def match(model: IntersectionModel, objects: ObjectArrays) -> list[Match]:
-    who, lane, distance, speed = match_kernel(path_table(model), objects, 0.3, SIXTY)
+    who, lane, distance, speed = match_kernel(path_table(model), objects, 0.3, SIXTY, 4.0, 0.0)
     return list(zip(who.tolist(), lane.tolist(), distance.tolist(), speed.tolist(), strict=True))
 
 
@@ -151,6 +151,26 @@ def test_a_vehicle_that_has_merged_counts_until_past_the_goal(
 ) -> None:
     matched = match(merging_model(), object_arrays([[x, 0.0, 0.0, 5.0]]))
     assert [d for _, _, d, _ in matched] == pytest.approx(expected)
+
+
+@pytest.mark.parametrize(
+    ("y", "length_m", "position_error_m", "counts"),
+    [
+        (3.1, 4.0, 0.0, False),
+        (3.4, 4.0, 0.5, True),
+        (3.6, 4.0, 0.5, False),
+        (6.9, 12.0, 0.0, True),
+        (7.1, 12.0, 0.0, False),
+        (7.4, 12.0, 0.5, True),
+    ],
+)
+def test_a_vehicle_counts_until_its_rear_has_left_the_zone_for_certain(
+    y: float, length_m: float, position_error_m: float, counts: bool
+) -> None:
+    objects = object_arrays([[0.0, y, NORTH, 5.0]], size_m=(length_m, 2.0))
+    table = path_table(crossing_model())
+    who, *_ = match_kernel(table, objects, 0.3, SIXTY, 4.0, position_error_m)
+    assert len(who) == int(counts)
 
 
 def test_one_vehicle_can_be_on_several_lanes() -> None:

@@ -62,7 +62,7 @@ def _lane_along(
     for a in range(len(poses)):
         for q in range(len(table.lane)):
             d, along = distance_on_path_kernel(
-                table, q, poses[a, 0], poses[a, 1], poses[a, 2], tolerance, turn
+                table, q, poses[a, 0], poses[a, 1], poses[a, 2], tolerance, turn, 0.0
             )
             if d < distance[a, table.lane[q]]:
                 distance[a, table.lane[q]] = d

@@ -6,10 +6,10 @@ import math
 from risk_dqn_planner.compiled import kernel
 from risk_dqn_planner.policies.foresight.sight import hidden_from
 from risk_dqn_planner.policies.foresight.task import Task, Work
-from risk_dqn_planner.risk.rewards import leader_gap
 from risk_dqn_planner.safety.joint_check import foresee
 from risk_dqn_planner.safety.others import NOTHING, hidden_arrival
 from risk_dqn_planner.safety.speeds import error_ahead
+from risk_dqn_planner.situation.common_path import leader_gap
 
 
 @kernel

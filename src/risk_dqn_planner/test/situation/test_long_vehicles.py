@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Long vehicles count by the nearer end. Lane 1 runs north, its zone is 6 m about the origin."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from risk_dqn_planner.intersection.model import ConflictKind
+from risk_dqn_planner.situation.builder import SituationBuilder
+from risk_dqn_planner.situation.inputs import EgoPose, object_arrays
+from risk_dqn_planner.situation.long_vehicles import nearest_ends
+from risk_dqn_planner.situation.warm_up import crossing_model, square
+
+CROSSING = crossing_model()
+# The ego's zone is s = 57 to 63 m, and what has joined is where the ego's zone ends.
+MERGING = replace(
+    CROSSING,
+    lanes=(replace(CROSSING.lanes[0], kind=ConflictKind.MERGING, ego_join_m=63.0),),
+)
+
+
+def counts_at(
+    distance_m: float, length_m: float, ego_s: float = 0.0, merging: bool = False
+) -> float:
+    model = MERGING if merging else CROSSING
+    lane, at_m, length = np.array([0]), np.array([distance_m]), np.array([length_m])
+    return float(nearest_ends(model, ego_s, lane, at_m, length)[0])
+
+
+@pytest.mark.parametrize(
+    ("distance_m", "expected"),
+    # 4 m longer to either end; in between it is in the zone.
+    [(20.0, 16.0), (7.0, 3.0), (0.0, 0.0), (-3.5, -1.5), (-7.0, -3.0), (-9.0, -5.0)],
+)
+def test_before_a_crossing_zone_the_front_counts_and_past_it_the_rear(
+    distance_m: float, expected: float
+) -> None:
+    assert counts_at(distance_m, 12.0) == pytest.approx(expected)
+
+
+@pytest.mark.parametrize("length_m", [0.0, 2.5, 4.0])
+def test_a_vehicle_that_is_short_or_of_unknown_length_is_where_its_centre_is(
+    length_m: float,
+) -> None:
+    assert counts_at(17.3, length_m) == 17.3
+    assert counts_at(17.3, length_m, merging=True) == 17.3
+
+
+@given(st.floats(-80.0, 80.0), st.floats(4.0, 25.0))
+def test_a_longer_vehicle_arrives_earlier_and_leaves_later(distance_m: float, more: float) -> None:
+    now, longer = counts_at(distance_m, more), counts_at(distance_m, more + 1.0)
+    assert longer <= now + 1e-9 if distance_m > 0.0 else longer >= now - 1e-9
+    # It is in the zone for the check exactly if one of its ends, or what is between, is.
+    half_m = 3.0 + 0.5 * (more - 4.0)
+    if abs(abs(distance_m) - half_m) > 1e-6:
+        assert (abs(now) < 3.0) == (abs(distance_m) < half_m)
+
+
+@pytest.mark.parametrize(
+    ("ego_s", "distance_m", "expected"),
+    [
+        # The ego is 10 m before the join; the vehicle's centre 5 m before it, then 10 m past it.
+        (53.0, 2.0, 6.0),
+        (53.0, -13.0, -9.0),
+        # 20 m before the join and so 10 m behind the ego.
+        (53.0, 17.0, 13.0),
+        # Beside the ego, whatever of it: neither ahead nor behind.
+        (53.0, 7.0, 7.0),
+        (53.0, 4.0, 7.0),
+        (53.0, 10.5, 7.0),
+    ],
+)
+def test_whoever_merges_is_ahead_by_its_rear_and_behind_by_its_front(
+    ego_s: float, distance_m: float, expected: float
+) -> None:
+    assert counts_at(distance_m, 12.0, ego_s, merging=True) == pytest.approx(expected)
+
+
+def test_a_lorry_is_nearer_to_its_zone_than_a_car_at_the_same_place() -> None:
+    builder, ego = SituationBuilder(CROSSING), EgoPose(-20.0, 0.0, 0.0, 4.0)
+    row = [0.0, -30.0, math.pi / 2, 5.0]
+    car, lorry = (
+        builder.build(ego, object_arrays([row], size_m=(length_m, 2.0)), square(40.0))
+        for length_m in (4.0, 10.0)
+    )
+    assert car.vehicle_distance_m[0, 0] == pytest.approx(30.0)
+    assert lorry.vehicle_distance_m[0, 0] == pytest.approx(27.0)

@@ -154,11 +154,16 @@ class SafetyAssumptions:
 
     def __post_init__(self) -> None:
         require_in_range(self)
-        longest_s = min(self.actuation_delay_s, self.decision_period_s)
-        if self.actuation_jitter_s > longest_s:
+        if self.actuation_delay_s > self.decision_period_s:
+            raise ConfigurationError(
+                f"SafetyAssumptions.actuation_delay_s is {self.actuation_delay_s}, expected at "
+                f"most decision_period_s ({self.decision_period_s:g}): of several decisions on "
+                "their way the check knows the last"
+            )
+        if self.actuation_jitter_s > self.actuation_delay_s:
             raise ConfigurationError(
                 f"SafetyAssumptions.actuation_jitter_s is {self.actuation_jitter_s}, expected at "
-                f"most actuation_delay_s and decision_period_s ({longest_s:g})"
+                f"most actuation_delay_s ({self.actuation_delay_s:g})"
             )
         least_mps2 = self.ego.braking_mps2 * self.ego_braking_factor
         if self.leader_braking_mps2 < least_mps2:

@@ -30,6 +30,20 @@ RUN_OPTIONS = $(call option,--map,MAP) $(call option,--route,ROUTE) $(call optio
   $(call option,--scenario,SCENARIO) $(call option,--episodes,EPISODES) $(call option,--seed,SEED) \
   $(call option,--rate,RATE) $(call option,--out,OUT)
 
+# A variable that no target takes is most likely misspelt: its help line names those that it takes.
+GIVEN := $(strip $(foreach each,$(filter-out -%,$(.VARIABLES)),\
+  $(if $(filter command,$(firstword $(origin $(each)))),$(each))))
+HASH := \#
+ifneq ($(GIVEN),)
+TAKEN := $(shell awk -F ':.*## ' -v goals=' $(or $(MAKECMDGOALS),help) ' \
+  '/^[a-z]+:.*$(HASH)$(HASH) / && index(goals, " " $$1 " ") {print $$2}' $(firstword $(MAKEFILE_LIST)) \
+  | grep -oE '[A-Z]{2,}')
+UNKNOWN := $(filter-out $(TAKEN) ARGS PYTHON HOST_PYTHON ROS_FROM OMP_NUM_THREADS,$(GIVEN))
+ifneq ($(UNKNOWN),)
+$(error make $(or $(MAKECMDGOALS),help) takes no $(UNKNOWN), but: $(TAKEN) ARGS)
+endif
+endif
+
 # How the shipped policies are trained; `evaluate` takes all seeds in out/training of each.
 SEEDS := 0 1 2
 RISK_AWARE_PAPER := --preset paper --reward risk --name risk_aware_paper
@@ -53,8 +67,8 @@ help: ## list the targets
 setup: ## set up ROS, Python and the built packages, and run nothing
 	@$(BOOTSTRAP)
 
-demo: ## drive episodes over DDS [MAP ROUTE ORIGIN PROJECTOR POLICY SCENARIO EPISODES SEED RATE OUT]
-	@$(WITH_ROS) $(SIMULATION)/demo $(RUN_OPTIONS) $(ARGS)
+demo: ## drive episodes over DDS [MAP ROUTE ORIGIN PROJECTOR POLICY SUPERVISOR SCENARIO EPISODES SEED RATE OUT]
+	@$(WITH_ROS) $(SIMULATION)/demo $(RUN_OPTIONS) $(call option,--supervisor,SUPERVISOR) $(ARGS)
 
 # Networks in tests that run side by side must not wait for each other's cores.
 test: export OMP_NUM_THREADS ?= 1
@@ -66,10 +80,10 @@ replay: ## feed a bag to the real nodes and compare decisions: BAG=four_way or a
 	@$(WITH_ROS) $(SIMULATION)/replay '$(BAG)' $(ARGS)
 
 bags: ## record the bags anew; UPDATE=1 keeps their inputs; changed decisions need a REASON='...' [BAG]
-	@$(WITH_ROS) $(SIMULATION)/$(if $(UPDATE),update_bags $(if $(BAG),'$(BAG)'),record \
+	@$(WITH_ROS) $(SIMULATION)/$(if $(filter-out 0,$(UPDATE)),update_bags $(if $(BAG),'$(BAG)'),record \
 	  $(call option,--bag,BAG)) $(call option,--reason,REASON) $(ARGS)
 
-convert: ## make a bag of another stack into one to replay: BAG=recorded/bag OUT=new/bag [MAP ROUTE ...]
+convert: ## make a bag of another stack into one to replay: BAG=recorded/bag OUT=new/bag [MAP ROUTE ORIGIN PROJECTOR POLICY]
 	@$(if $(and $(BAG),$(OUT)),,echo 'error: say which, for example make convert BAG=recorded OUT=new' >&2; exit 2)
 	@$(WITH_ROS) $(SIMULATION)/convert '$(BAG)' '$(OUT)' $(call option,--map,MAP) \
 	  $(call option,--route,ROUTE) $(call option,--origin,ORIGIN) \
@@ -120,7 +134,7 @@ story: ## tell when and why decisions changed: BAG=four_way or a folder [TOPIC P
 	@$(WITH_ROS) $(SIMULATION)/story '$(BAG)' $(call option,--topic,TOPIC) \
 	  $(call option,--picture,PICTURE) $(ARGS)
 
-soak: ## drive for an hour of simulated time and watch memory and decisions [HOURS=1 MAP POLICY SCENARIO OUT]
+soak: ## drive for an hour of simulated time and watch memory and decisions [HOURS=1 MAP ROUTE ORIGIN PROJECTOR POLICY SCENARIO SEED OUT]
 	@$(WITH_ROS) $(SIMULATION)/soak $(call option,--hours,HOURS) $(RUN_OPTIONS) $(ARGS)
 
 timing: ## measure the nodes, soak them for an hour, and write docs/timing.md

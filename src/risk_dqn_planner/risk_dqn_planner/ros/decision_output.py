@@ -11,6 +11,7 @@ from risk_dqn_planner.decision import Reason
 from risk_dqn_planner.faults import FaultyInput
 from risk_dqn_planner.policies.base import Supervision
 from risk_dqn_planner.ros import conversions, markers
+from risk_dqn_planner.ros.assumed_times import AssumedTimes, Gaps
 from risk_dqn_planner.ros.clock import now_ns, steady_timer
 from risk_dqn_planner.ros.decider import Choice
 from risk_dqn_planner.ros.diagnostics import ERROR, OK, WARN, Diagnostics, stream_status
@@ -27,7 +28,8 @@ class DecisionOutput:
         self._node = node
         self.marker_frame = marker_frame
         self.rates = SituationRates()
-        self.allowed_age_s = float("inf")  # of situations, by what the supervisor assumes
+        self.assumed: AssumedTimes | None = None  # of situations, by the supervisor
+        self._gaps = Gaps()
         self._publisher = node.create_publisher(Decision, "~/output/decision", NEWEST)
         self._marker_publisher = node.create_publisher(MarkerArray, "~/debug/markers", NEWEST)
         self.diagnostics = Diagnostics(node, "planner")
@@ -51,6 +53,9 @@ class DecisionOutput:
     def tell(self, choice: Choice, stamp_ns: int, stream: Stream) -> None:
         """Tell of a decision everywhere else; `stream`: the situations it is taken on."""
         self._stream = stream
+        # After a fault the supervisor counts on nothing from before.
+        asked = not choice.decision.reason.is_fault
+        self._gaps.note(choice.situation_stamp_ns if asked else None, self.assumed)
         self._tell(choice)
         at_fault = choice.decision.faulty_input is FaultyInput.SITUATION
         if at_fault or not self.diagnostics.is_well("situation"):
@@ -92,11 +97,7 @@ class DecisionOutput:
         """Keep the diagnostics of the situations; a changed level goes out at once."""
         now = now_ns(self._node)
         level, text, values = stream_status(stream, now, self.rates.situation)
-        age_s = stream.age_s(now)
-        if level == OK and age_s is not None and age_s > self.allowed_age_s:
-            level = WARN
-            text = (
-                f"{age_s:.2f} s old, but the supervisor assumes that decisions take effect "
-                f"within {self.allowed_age_s:g} s (safety.actuation_delay_s)"
-            )
+        if level == OK and self.assumed is not None:
+            objection = self.assumed.objection_to_age(stream.age_s(now)) or self._gaps.take()
+            level, text = (WARN, objection) if objection else (level, text)
         self.diagnostics.set("situation", level, text, values)

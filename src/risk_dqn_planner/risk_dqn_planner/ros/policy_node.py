@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Publishes a decision twice a second, whatever the inputs do."""
 
-import math
 import os
 import time
 import traceback
@@ -20,6 +19,7 @@ from risk_dqn_planner.policies.supervised import Supervisor, SupervisorMode, sup
 from risk_dqn_planner.policies.supervised_loading import config_of, is_sound, load_supervised
 from risk_dqn_planner.policies.trust import ANYTHING, listed
 from risk_dqn_planner.ros import conversions
+from risk_dqn_planner.ros.assumed_times import AssumedTimes
 from risk_dqn_planner.ros.clock import allowed_lead_s, now_ns, on_clock_back
 from risk_dqn_planner.ros.decider import (
     Choice,
@@ -136,8 +136,8 @@ class PolicyNode(ManagedNode):
         if self._supervisor is not None and self._supervisor.mode is not mode:
             self._supervisor.mode = mode
             self._decider.forget()  # what was verified before is not what was carried out
-        delay_s = self.get_parameter("safety.actuation_delay_s").value
-        self._output.allowed_age_s = delay_s if supervised else math.inf
+        assumed = AssumedTimes.of(read_assumptions(self.declared, settings.rate_hz))
+        self._output.assumed = assumed if supervised else None
 
     def activate(self) -> None:
         """Begin to decide."""

@@ -2,11 +2,12 @@
 """The set `soundness`: where no collision may happen, what accepted risk buys, what breaks it."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import product
 
 from risk_dqn_planner.safety.assumptions import NO_CAP_MPS, SafetyAssumptions
 from risk_dqn_planner.situation.config import TRACKED
+from risk_dqn_planner.vehicle import EgoLimits
 from sim_bridge.evaluation.cells import BASE, FINITE, RESPAWNING, Cell
 from sim_bridge.scenarios.loading import load_scenario, scenario_names
 
@@ -20,8 +21,9 @@ UNAIDED = (FASTEST_SOUND, SOUND_DQN)
 # Those whose every action is sound where the assumptions hold.
 SOUND = (FASTEST_SOUND, LOOK_AHEAD, SOUND_DQN, SUPERVISED)
 
-GOAL, MEMORY, FRONTIER, VIOLATED = "goal", "memory", "frontier", "violated"
-PARTS = (GOAL, MEMORY, FRONTIER, VIOLATED)
+GOAL, MEMORY, FRONTIER = "goal", "memory", "frontier"
+VIOLATED, GRANTED = "violated", "granted"
+PARTS = (GOAL, MEMORY, FRONTIER, VIOLATED, GRANTED)
 MAPS = ("four_way", "t_junction", "multi_lane", "roundabout")
 OCCLUDED, CLOSE, NOISE = "severe_occlusion", "close_small_obstacle", "sensor_noise"
 SCENARIOS = (
@@ -36,6 +38,10 @@ BRAKES_AFTER_S = (None, 1.0)
 VIOLATIONS = (
     "others_over_the_limit", "weak_brakes", "delay_200ms", "delay_500ms", "missed_detections",
     "phantom_detections", "velocity_bias",
+)  # fmt: skip
+# Those of them that the check can be told of.
+GRANTABLE = (
+    "others_over_the_limit", "weak_brakes", "delay_200ms", "delay_500ms", "velocity_bias",
 )  # fmt: skip
 FRONTIER_ON, VIOLATED_ON = "four_way", ("four_way", "roundabout")
 # Errors of perceived speeds have no bound; 1 of 16 000 lies outside of so many deviations.
@@ -66,15 +72,35 @@ def assumptions_for(cell: Cell) -> SafetyAssumptions:
     return SafetyAssumptions(speed_error_mps=NOISE_DEVIATIONS * noise_mps, period_error_s=0.0)
 
 
+def granting_assumptions(cell: Cell) -> SafetyAssumptions:
+    """Return assumptions that a world keeps which does not keep the default ones."""
+    scenario = cell.load()
+    ego, limits = scenario.ego, EgoLimits()
+    usual = assumptions_for(cell)
+    return replace(
+        usual,
+        actuation_delay_s=ego.actuation_delay_s,
+        speed_limit_factor=scenario.traffic.overspeed_factor,
+        speed_error_mps=usual.speed_error_mps + abs(scenario.sensor.velocity_bias_mps),
+        ego=replace(limits, braking_mps2=limits.braking_mps2 * ego.braking_factor),
+    )
+
+
 def soundness_cells(maps: Sequence[str] = MAPS) -> list[SoundnessCell]:
     """Return all cells on these maps whose scenarios there are.
 
     maps: names, or .osm files, which have every part of the set; of the project's own maps the
-    last two parts take some only.
+    frontier and the broken assumptions take some only.
     """
     frontier = [each for each in maps if each == FRONTIER_ON or each not in MAPS]
     violated = [each for each in maps if each in VIOLATED_ON or each not in MAPS]
-    return [*_goal(maps), *_memory(maps), *_frontier(frontier), *_violated(violated)]
+    return [
+        *_goal(maps),
+        *_memory(maps),
+        *_frontier(frontier),
+        *_violated(violated),
+        *_granted(maps),
+    ]
 
 
 def missing_scenarios() -> list[str]:
@@ -123,3 +149,12 @@ def _violated(maps: Sequence[str]) -> Iterator[SoundnessCell]:
         for scenario in (BASE, *(each for each in VIOLATIONS if each in scenario_names())):
             cell = Cell(scenario, _traffic(scenario), sensor_forward_m=0.0)
             yield SoundnessCell(VIOLATED, map_name, cell, holds=scenario == BASE)
+
+
+def _granted(maps: Sequence[str]) -> Iterator[SoundnessCell]:
+    """The same worlds, and a check that is told of them."""
+    for map_name in maps:
+        for scenario in (each for each in GRANTABLE if each in scenario_names()):
+            cell = Cell(scenario, _traffic(scenario), sensor_forward_m=0.0)
+            own = granting_assumptions(cell)
+            yield SoundnessCell(GRANTED, map_name, cell, own, SOUND)

@@ -17,6 +17,7 @@ from sim_bridge.evaluation.progress import progress_on
 from sim_bridge.evaluation.rollout import Clairvoyant, Contestant
 from sim_bridge.evaluation.soundness.cells import (
     GOAL,
+    GRANTED,
     MAPS,
     SEARCHING,
     UNAIDED,
@@ -96,7 +97,7 @@ class Plan:
         """Return how many episodes of a cell a policy drives."""
         if policy in SEARCHING:
             return min(self.episodes, self.search_episodes)
-        if policy in UNAIDED and cell.part == GOAL and self.sound_episodes is not None:
+        if policy in UNAIDED and cell.part in (GOAL, GRANTED) and self.sound_episodes is not None:
             return max(self.sound_episodes, self.limited)
         return self.episodes
 

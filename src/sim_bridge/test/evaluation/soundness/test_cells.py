@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
+import dataclasses
 import itertools
+
+import pytest
 
 from risk_dqn_planner.safety.assumptions import NO_CAP_MPS, SafetyAssumptions
 from risk_dqn_planner.situation.config import INSTANTANEOUS, TRACKED
@@ -7,6 +10,8 @@ from sim_bridge.evaluation.cells import FINITE, RESPAWNING
 from sim_bridge.evaluation.soundness.cells import (
     FRONTIER,
     GOAL,
+    GRANTABLE,
+    GRANTED,
     MAPS,
     MEMORY,
     SCENARIOS,
@@ -38,7 +43,7 @@ def test_sensor_and_traffic_are_as_the_cell_says() -> None:
 
 
 def test_only_where_speeds_are_noisy_the_check_allows_for_errors() -> None:
-    for each in soundness_cells():
+    for each in (each for each in soundness_cells() if each.part != GRANTED):
         noisy = each.cell.scenario == "sensor_noise"
         # 4 deviations of 1 m/s.
         assert each.assumptions.speed_error_mps == (4.0 if noisy else 0.0)
@@ -66,12 +71,34 @@ def test_a_broken_assumption_is_never_held_against_a_policy() -> None:
     assert len({each.cell.scenario for each in broken}) == 1 + 7
 
 
+def test_what_breaks_assumptions_is_granted_wherever_the_check_can_be_told() -> None:
+    granted = [each for each in soundness_cells() if each.part == GRANTED]
+    assert {(each.map_name, each.cell.scenario) for each in granted} == set(
+        itertools.product(MAPS, GRANTABLE)
+    )
+    assert all(each.holds for each in granted)
+    told = {each.cell.scenario: each.assumptions for each in granted}
+    assert told["delay_200ms"].actuation_delay_s == 0.2
+    assert told["delay_500ms"].actuation_delay_s == 0.5
+    assert told["weak_brakes"].ego.braking_mps2 == pytest.approx(0.8 * 3.5)
+    assert told["others_over_the_limit"].speed_limit_factor == 1.2
+    assert told["velocity_bias"].speed_error_mps == 1.0
+    plain = [a for a in dataclasses.fields(SafetyAssumptions) if a.name != "period_error_s"]
+    for each in granted:
+        changed = [
+            a.name
+            for a in plain
+            if getattr(each.assumptions, a.name) != getattr(SafetyAssumptions(), a.name)
+        ]
+        assert len(changed) == 1
+
+
 def test_a_map_that_is_none_of_the_project_s_own_has_every_part() -> None:
     cells = soundness_cells(["town.osm"])
     assert {each.map_name for each in cells} == {"town.osm"}
-    assert len(cells) == 7 * 2 + 2 * 2 + 8 * 2 + 1 + 7
+    assert len(cells) == 7 * 2 + 2 * 2 + 8 * 2 + 1 + 7 + 5
     some = soundness_cells(["t_junction"])
-    assert {each.part for each in some} == {GOAL, MEMORY}
+    assert {each.part for each in some} == {GOAL, MEMORY, GRANTED}
 
 
 def test_contestants_take_over_the_cell_s_assumptions() -> None:

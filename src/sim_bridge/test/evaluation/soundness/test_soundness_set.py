@@ -9,7 +9,7 @@ from risk_dqn_planner.errors import ConfigurationError
 from sim_bridge.evaluation import campaign, evaluate
 from sim_bridge.evaluation.reporting.markdown import entries_told
 from sim_bridge.evaluation.soundness.beam import BeamConfig
-from sim_bridge.evaluation.soundness.cells import soundness_cells
+from sim_bridge.evaluation.soundness.cells import GOAL, GRANTED, VIOLATED, soundness_cells
 from sim_bridge.evaluation.soundness.evaluate import Plan
 from sim_bridge.evaluation.soundness.reporting.tables import at_a_glance, cells_reached, outcome
 from sim_bridge.maps import shipped_map
@@ -149,9 +149,13 @@ def test_policies_that_search_drive_fewer_episodes_but_all_whose_limits_are_sear
 
 def test_who_may_not_collide_can_be_asked_for_more_episodes() -> None:
     plan = Plan(Path("out"), episodes=2000, sound_episodes=100_000, search_episodes=300)
-    goal, other = soundness_cells()[0], soundness_cells()[-1]
+    goal, granted, other = (
+        next(each for each in soundness_cells() if each.part == part)
+        for part in (GOAL, GRANTED, VIOLATED)
+    )
     for policy in ("fastest_sound", "sound_dqn"):
         assert plan.episodes_of(policy, goal) == 100_000
+        assert plan.episodes_of(policy, granted) == 100_000
         assert plan.episodes_of(policy, other) == 2000
     for policy in ("tuned+supervisor", "tuned"):
         assert plan.episodes_of(policy, goal) == 2000

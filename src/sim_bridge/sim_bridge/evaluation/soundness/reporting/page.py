@@ -9,7 +9,7 @@ from typing import Any
 from sim_bridge.evaluation.cells import BASE
 from sim_bridge.evaluation.reporting.markdown import folded, table, versions_table
 from sim_bridge.evaluation.reporting.selection import Line
-from sim_bridge.evaluation.soundness.cells import FRONTIER, GOAL, MEMORY, VIOLATED
+from sim_bridge.evaluation.soundness.cells import FRONTIER, GOAL, GRANTED, MEMORY, VIOLATED
 from sim_bridge.evaluation.soundness.limits import SOUND_LIMIT
 from sim_bridge.evaluation.soundness.reporting.pictures import draw_frontier
 from sim_bridge.evaluation.soundness.reporting.tables import (
@@ -112,6 +112,14 @@ Each scenario breaks one thing that the check takes for granted; the check does 
 keeps all, for comparison. Collisions here break no promise.
 """
 
+_GRANTED = """\
+## Where the check is told
+
+The same worlds, with `SafetyAssumptions` that grant what each does: the delay, the weaker braking,
+the higher speeds, the bias. So they keep their assumptions, and nobody may collide; what that costs
+is success and speed.
+"""
+
 
 def write_soundness(content: dict[str, Any], folder: Path, report: Path | None) -> list[Path]:
     """Draw the pictures into a folder, and write the page with its own if it is asked for."""
@@ -130,6 +138,7 @@ def write_soundness(content: dict[str, Any], folder: Path, report: Path | None) 
         _memory(part_of(lines, MEMORY), part_of(lines, GOAL)),
         _frontier(part_of(lines, FRONTIER), links),
         _violated(part_of(lines, VIOLATED)),
+        _granted(part_of(lines, GRANTED)),
         _versions(content["versions"]),
     ]
     report.parent.mkdir(parents=True, exist_ok=True)
@@ -237,6 +246,12 @@ def _violated(lines: Sequence[Line]) -> str:
     if not lines:
         return ""
     return f"{_VIOLATED}\n{full(lines, _broken, 'scenario')}"
+
+
+def _granted(lines: Sequence[Line]) -> str:
+    if not lines:
+        return ""
+    return "\n".join((_GRANTED, collisions_in_all(lines), full(lines, _broken, "scenario")))
 
 
 def _broken(line: Line) -> str:

@@ -52,6 +52,13 @@ def bag_folder(named: Path, folder: Path = ALL_BAGS) -> Path:
     return beside if not named.exists() and beside.exists() else named
 
 
+def no_bag(path: Path, folder: Path = ALL_BAGS) -> BagError:
+    """Return the error about a path that holds no bag; it names those in the folder of all bags."""
+    names = ", ".join(sorted(each.parent.name for each in folder.glob("*/metadata.yaml")))
+    named = f", or one of {names}" if names else ""
+    return BagError(f"{path} is no bag, expected a folder with metadata.yaml{named}")
+
+
 @dataclass(frozen=True)
 class Stored:
     """A serialised message of a topic; `data` is its CDR with the encapsulation header."""
@@ -206,7 +213,7 @@ def read_bag(
             ]
             custom = reader.storage.metadata.custom
     except FileNotFoundError as error:
-        raise BagError(f"{path} is no bag, expected a folder with metadata.yaml") from error
+        raise no_bag(path) from error
     except (ReaderError, OSError) as error:
         raise BagError(f"{path} cannot be read as a bag: {error}") from error
     return Bag(path, dict(custom or {}), messages)

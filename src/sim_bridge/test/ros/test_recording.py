@@ -11,7 +11,7 @@ from rclpy.serialization import serialize_message
 from risk_dqn_planner.errors import BagError
 from risk_dqn_planner.ros.conversions import to_stamp
 from sim_bridge.ros import topics
-from sim_bridge.ros.recording import BagWriter, Stored, read_bag, stamp_of
+from sim_bridge.ros.recording import BagWriter, Stored, no_bag, read_bag, stamp_of
 
 TOPICS = (topics.OBJECTS, topics.DECISION)
 
@@ -78,6 +78,15 @@ def test_a_path_without_a_bag_is_refused(tmp_path: Path) -> None:
         read_bag(tmp_path / "nowhere", TOPICS)
     with pytest.raises(BagError, match="is no bag"):
         read_bag(tmp_path, TOPICS)
+
+
+def test_who_misspells_a_bag_is_told_the_names_there_are(tmp_path: Path) -> None:
+    for name in ("t_junction", "four_way"):
+        record(tmp_path / name, [decision(1)])
+    (tmp_path / "CHANGES.md").touch()
+    assert str(no_bag(Path("fourway"), tmp_path)) == (
+        "fourway is no bag, expected a folder with metadata.yaml, or one of four_way, t_junction"
+    )
 
 
 def test_a_damaged_bag_is_refused(tmp_path: Path) -> None:

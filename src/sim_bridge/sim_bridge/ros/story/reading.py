@@ -22,7 +22,7 @@ from rosbags.typesys.store import Typestore
 from risk_dqn_planner.errors import BagError
 from risk_dqn_planner.policies.base import Action, Reason
 from risk_dqn_planner.ros.streams import SECOND_NS
-from sim_bridge.ros.recording import installed_types
+from sim_bridge.ros.recording import installed_types, no_bag
 
 DECISION = "intersection_msgs/msg/Decision"
 EPISODE = "intersection_msgs/msg/EpisodeEvent"
@@ -77,7 +77,7 @@ def read(path: Path, topic: str | None = None) -> Recorded:
             chosen = _choose(folder, reader.connections, topic)
             return Recorded(chosen, _events(reader, chosen))
     except FileNotFoundError as error:
-        raise BagError(f"{folder} is no bag, expected a folder with metadata.yaml") from error
+        raise no_bag(folder) from error
     except (ReaderError, SerdeError, TypesysError, OSError) as error:
         raise BagError(f"{folder} cannot be read as a bag: {error}") from error
 

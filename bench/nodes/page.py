@@ -123,13 +123,14 @@ def drives(bench: Mapping[str, Any]) -> str:
                 name,
                 *(f"{situation[key]:.1f}" for key in ("p50_ms", "p99_ms", "max_ms")),
                 f"{found['late']} of {situation['timed']}",
+                str(found["doubtful"]),
                 *(f"{uneven[key]:.1f}" for key in ("p50_ms", "p99_ms", "max_ms")),
                 str(uneven["timed"]),
                 f"{computed['situation_node']:.1f}",
             )
         )
     header = (
-        "drive", "situation p50 [ms]", "p99", "longest", "late", "uneven p50 [ms]", "p99",
+        "drive", "situation p50 [ms]", "p99", "longest", "late", "faults", "uneven p50 [ms]", "p99",
         "largest", "intervals", "processor [ms]",
     )  # fmt: skip
     return table(header, rows)

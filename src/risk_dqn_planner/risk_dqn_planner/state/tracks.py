@@ -43,10 +43,6 @@ class Track(NamedTuple):
     critical: Floats
 
 
-# Fields of named tuples are taken out before the loops: reading them inside costs a count of
-# references each time.
-
-
 @kernel
 def scene_before(head: int, k: int) -> int:
     """Return the place in the rings of the scene k before the present one."""

@@ -16,6 +16,7 @@ from rclpy.parameter import Parameter
 
 from risk_dqn_planner.errors import ConfigurationError
 from risk_dqn_planner.intersection.config import IntersectionConfig
+from risk_dqn_planner.ros.adapters.kinds import ObjectsAdapter
 from risk_dqn_planner.ros.decider import DeciderConfig
 from risk_dqn_planner.ros.declaration import Declared, declare
 from risk_dqn_planner.ros.lifecycle import LifecycleParameters
@@ -286,8 +287,8 @@ def test_the_parameter_file_holds_all_parameters_with_their_defaults() -> None:
     intersection = dataclasses.asdict(IntersectionConfig())
     del intersection["sensor_range_m"]  # the situation's own
     situation = defaults(
-        LifecycleParameters(), MapParameters(), EgoParameters(), AgeLimits(), SynchroniserConfig(),
-        ClockParameters(), SituationConfig(),
+        LifecycleParameters(), MapParameters(), EgoParameters(), ObjectsAdapter(), AgeLimits(),
+        SynchroniserConfig(), ClockParameters(), SituationConfig(),
     ) | flat(
         {
             "intersection": intersection,

@@ -45,10 +45,6 @@ def empty_view(batch: int, vehicles: int, obstacles: int) -> View:
     )
 
 
-# Fields of named tuples are taken out before the loops: reading them inside costs a count of
-# references each time.
-
-
 @kernel
 def look(ego: EgoLane, corners: Floats, offset_m: float, episodes: Episodes, view: View) -> None:
     """Place all sensors `offset_m` ahead of the egos and cast the shadows of their obstacles.

@@ -96,10 +96,6 @@ def advance(
         conclude(ego.goal_m, settings.limit_steps, episodes, counts)
 
 
-# Fields of named tuples are taken out before the loops: reading them inside costs a count of
-# references each time.
-
-
 @kernel
 def count_decisions(episodes: Episodes, counts: Counts, actions: Integers) -> None:
     """Count actions (B,) and their changes where a decision is due."""

@@ -204,11 +204,14 @@ def put(
 ) -> int:
     """Add a state that follows decision k, or let it replace a dearer one in its cell.
 
-    Returns how many there are.
+    States that still carry out unlike actions go on unlike each other. Returns how many there are.
     """
     speeds = int(p.fast_mps / c.cell_mps) + 2
     column = min(int(node.speed_mps / c.cell_mps + 0.5), speeds - 1)
-    cell = min(int(node.way_m * fine / c.cell_m) * speeds + column, len(cells.stamp) - 1)
+    cell = int(node.way_m * fine / c.cell_m) * speeds + column
+    if p.delay_s > 0.0:
+        cell = cell * ACTIONS + node.last
+    cell = min(cell, len(cells.stamp) - 1)
     side, i = (k + 1) % 2, count
     if cells.stamp[cell] == k:
         i = cells.node[cell]

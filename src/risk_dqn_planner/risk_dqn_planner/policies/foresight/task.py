@@ -8,6 +8,7 @@ import numpy as np
 
 from risk_dqn_planner.policies.foresight.creeping import shortfalls
 from risk_dqn_planner.safety.assumptions import SafetyNumbers
+from risk_dqn_planner.safety.joint_check import ACTIONS
 from risk_dqn_planner.safety.known import Known
 from risk_dqn_planner.situation.situations import (
     Booleans,
@@ -129,7 +130,7 @@ def work_for(c: SearchNumbers, p: SafetyNumbers, vehicles: int, lanes: int) -> W
     furthest_m = c.decisions * p.period_s * p.fast_mps
     # Egos that are faster than Fast at first share the last cells. Fine cells reach less far.
     cells = (math.ceil(furthest_m / c.cell_m) + 1) * (int(p.fast_mps / c.cell_mps) + 2)
-    cells *= c.fine
+    cells *= c.fine * (ACTIONS if p.delay_s > 0.0 else 1)
     return Work(
         ahead=empty_situations(c.decisions, vehicles, lanes),
         known=Known(

@@ -10,7 +10,7 @@ from risk_dqn_planner.ros.adapters.kinds import ObjectsAdapter
 from risk_dqn_planner.ros.parameters import EgoParameters, MapParameters
 from risk_dqn_planner.ros.streams import SECOND_NS
 from risk_dqn_planner.ros.synchroniser import Frame
-from risk_dqn_planner.situation.ego import carried_on
+from risk_dqn_planner.situation.ego import between, carried_on
 from risk_dqn_planner.situation.inputs import Perception
 from risk_dqn_planner.situation.pipeline import Route, SituationPipeline
 from risk_dqn_planner.situation.plausibility import Plausibility
@@ -61,13 +61,22 @@ class Evaluation:
     def report(self, frame: Frame) -> tuple[SituationReport, Perception | None]:
         """Return the situation of a frame and what it was made of, or why there is none."""
         try:
+            frame_id, to_center_m = self._maps.map_frame, self._ego.base_to_center_m
+            odometry, *beyond = frame.odometry
             seen = conversions.perception_from_messages(
-                *frame[1:], self._maps.map_frame, self._ego.base_to_center_m, self._objects
+                odometry, frame.visible_area, frame.objects, frame_id, to_center_m, self._objects
             )
-            odometry_ns = conversions.to_ns(frame.odometry.header.stamp)
-            self.plausibility.check(seen, odometry_ns / SECOND_NS, frame.stamp_ns / SECOND_NS)
-            later_s = (frame.stamp_ns - odometry_ns) / SECOND_NS
-            if later_s:
+            own_ns = conversions.to_ns(odometry.header.stamp)
+            self.plausibility.check(seen, own_ns / SECOND_NS, frame.stamp_ns / SECOND_NS)
+            later_s = (frame.stamp_ns - own_ns) / SECOND_NS
+            if beyond:
+                conversions.check_frame(beyond[0].header, frame_id, FaultyInput.ODOMETRY)
+                after = conversions.ego_from_message(beyond[0], to_center_m)
+                after_ns = conversions.to_ns(beyond[0].header.stamp)
+                self.plausibility.check_next_ego(after, after_ns / SECOND_NS)
+                share = (frame.stamp_ns - own_ns) / (after_ns - own_ns)
+                seen = seen._replace(ego=between(seen.ego, after, share))
+            elif later_s:
                 seen = seen._replace(ego=carried_on(seen.ego, later_s))
             return self.pipeline.report(frame.stamp_ns, seen), seen
         except PlannerError as error:

@@ -225,11 +225,15 @@ def _stand_in(name: str, reason: Reason, source: FaultyInput, text: str) -> Deci
 
 
 def _require_situations_for(rate_hz: float, rates: SituationRates) -> None:
-    """Raise ConfigurationError unless each decision may have a situation of its own."""
-    if rate_hz > rates.situation.min_rate_hz:
+    """Raise ConfigurationError unless each decision may have a situation of its own.
+
+    A rate of situations of 0 says that nothing is known of it.
+    """
+    if 0.0 < rates.situation.min_rate_hz < rate_hz:
         raise ConfigurationError(
             f"rate_hz is {rate_hz:g}, expected at most rates.situation.min_rate_hz "
-            f"({rates.situation.min_rate_hz:g}): each decision needs a new situation"
+            f"({rates.situation.min_rate_hz:g}), to be raised if perception is that fast: each "
+            "decision needs a new situation"
         )
 
 

@@ -178,6 +178,7 @@ class SituationNode(ManagedNode):
         stamp_ns = conversions.to_ns(message.header.stamp)
         if evaluation is None or not evaluation.begin(route, stamp_ns):
             return
+        self._synchroniser.begin_errand()
         model = evaluation.pipeline.model
         for note in () if model is None else model.notes:
             self.get_logger().info(f"route {list(route)}: {note}")

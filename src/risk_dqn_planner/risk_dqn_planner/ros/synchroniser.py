@@ -3,10 +3,10 @@
 
 Objects set the pace. Once a list of objects has arrived it waits until odometry and visible area
 are as new as itself, but no longer than a timeout on the steady clock. Of what has come by then the
-odometry nearest in time serves, and the newest visible area that is not newer than the objects:
-one that is may show a place free for somebody who was hidden when the objects were perceived. Ages
-are differences of stamps, never times of arrival, so the same frames come out with a clock that
-stands still, jumps from tick to tick, or runs fast.
+odometry before and after the objects serves, and the newest visible area that is not newer than
+they are: one that is may show a place free for somebody who was hidden when the objects were
+perceived. Ages are differences of stamps, never times of arrival, so the same frames come out with
+a clock that stands still, jumps from tick to tick, or runs fast.
 """
 
 from dataclasses import dataclass, field
@@ -40,10 +40,13 @@ class SynchroniserConfig:
 
 
 class Frame(NamedTuple):
-    """Messages that belong together, at the time of the objects [ns]."""
+    """Messages that belong together, at the time of the objects [ns].
+
+    odometry: the message of that time, or the ones before and after it, as far as there are.
+    """
 
     stamp_ns: int
-    odometry: Any
+    odometry: tuple[Any, ...]
     visible_area: Any
     objects: Any
 
@@ -76,7 +79,10 @@ class Synchroniser:
         self._event = fault or self._event
         backlog = self._backlogs.get(source)
         if backlog is not None:
-            backlog.add(Stamped(stamp_ns, message), self.streams[source].limits.max_age_ns)
+            # Inputs may be ahead of a clock by which objects are late, each as far as it may.
+            limits = self.streams[source].limits
+            kept_ns = limits.max_age_ns + max(limits.max_ahead_ns, 0)
+            backlog.add(Stamped(stamp_ns, message), kept_ns)
         if source is FaultyInput.OBJECTS and self._deadline_ns is None:
             # Later lists do not put the deadline off, or a late input would stall everything.
             self._deadline_ns = steady_ns + self._timeout_ns
@@ -105,19 +111,31 @@ class Synchroniser:
     def _frame(self, objects: Stamped) -> Frame | Fault:
         """Return what belongs to objects, or what is missing or too old beside them."""
         stamp_ns, source = objects.stamp_ns, FaultyInput.VISIBLE_AREA
-        odometry = self._backlogs[FaultyInput.ODOMETRY].nearest(stamp_ns)
         area = self._backlogs[source].up_to(stamp_ns)
-        if area is None or odometry is None:
+        if area is None:
             text = f"no {source} of the objects' time or before received yet"
             return Fault(stamp_ns, Status.MISSING_INPUT, source, text)
-        age_ns, limits = stamp_ns - area.stamp_ns, self.streams[source].limits
-        if age_ns > limits.max_age_ns:
+        limits = self.streams[source].limits
+        if stamp_ns - area.stamp_ns > limits.max_age_ns:
+            age_s = (stamp_ns - area.stamp_ns) / SECOND_NS
             text = (
-                f"the last {source} before the objects is {age_ns / SECOND_NS:.2f} s older, "
+                f"the last {source} before the objects is {age_s:.2f} s older, "
                 f"expected at most {limits.max_input_age_s:g} s"
             )
             return Fault(stamp_ns, Status.STALE_INPUT, source, text)
-        return Frame(stamp_ns, odometry.message, area.message, objects.message)
+        source = FaultyInput.ODOMETRY
+        around = self._backlogs[source].around(stamp_ns)
+        near = [one for one in around if abs(one.stamp_ns - stamp_ns) <= limits.max_age_ns]
+        if not near:
+            text = f"no {source} within {limits.max_input_age_s:g} s of the objects"
+            return Fault(stamp_ns, Status.STALE_INPUT, source, text)
+        odometry = tuple(one.message for one in near)
+        return Frame(stamp_ns, odometry, area.message, objects.message)
+
+    def begin_errand(self) -> None:
+        """Forget where the ego was before, and what it saw from there."""
+        for backlog in self._backlogs.values():
+            backlog.keep_newest()
 
     def overdue(self, now_ns: int, steady_ns: int) -> Fault | None:
         """Return what is missing, too old or ahead by the clock of the stamps."""

@@ -21,6 +21,7 @@ from risk_dqn_planner.situation.memory import LaneMemory, Look
 from risk_dqn_planner.situation.occlusion import hidden_distances_kernel
 from risk_dqn_planner.situation.paths import path_table
 from risk_dqn_planner.situation.situations import Floats, Situations, empty_situations
+from risk_dqn_planner.situation.vanished import Vanished
 
 
 class SituationBuilder:
@@ -37,9 +38,16 @@ class SituationBuilder:
         limits = np.array([lane.speed_limit_mps for lane in model.lanes])
         self._hidden_mps = limits * self.config.tracking.speed_factor
         self._exit_m = np.array([-0.5 * lane.zone_length_m for lane in model.lanes])
+        self._vanished = Vanished(self._hidden_mps, self.config.tracking)
         self.memory: LaneMemory | None = None
         if self.config.memory == TRACKED:
             self.memory = LaneMemory(self._table, limits, self.config)
+
+    def forget(self) -> None:
+        """Begin an errand: what was perceived before bears on nothing."""
+        self._vanished.forget()
+        if self.memory is not None:
+            self.memory.forget()
 
     def build(
         self,
@@ -53,9 +61,9 @@ class SituationBuilder:
 
         visible_area: simple polygon (K, 2) in the map frame. An object whose centre lies in the
         ego's footprint is the ego itself and is left out. visible_area_age_s: how much older than
-        the objects the area is; whoever was hidden then may have come on since. The memory alone
-        asks for time_s, when the objects were perceived, on any clock; without a time nothing is
-        remembered.
+        the objects the area is; whoever was hidden then may have come on since, and whoever has
+        gone out of sight since is hidden. time_s: when the objects were perceived, on any clock;
+        without a time nothing is remembered.
 
         Raises:
             InputError: an input is not finite or not plausible; names which.
@@ -67,7 +75,9 @@ class SituationBuilder:
         ego_s = ego_progress(self.model, ego, self.config)
         lanes = self.model.lanes
         filled = self._with_vehicles(ego, ego_s, objects)
-        look = Look(time_s, ego, filled, visible_area, visible_area_age_s)
+        age_s = abs(visible_area_age_s)
+        released = self._vanished.look(time_s, age_s, objects.id, filled)
+        look = Look(time_s, ego, filled, visible_area, age_s, released)
         return filled._replace(
             stop_line_distance_m=np.array([self.model.stop_line.position_m - ego_s]),
             goal_distance_m=np.array([self.model.goal_m - ego_s]),
@@ -84,15 +94,19 @@ class SituationBuilder:
 
     def _hidden_distances(self, look: Look) -> Floats:
         """Return d_o (M,): how near a hidden vehicle may be, by memory or as the ego sees now."""
-        if self.memory is not None:
-            return self.memory.look(look)
-        hidden_m: Floats = hidden_distances_kernel(
+        hidden_m = self._seen_now(look) if self.memory is None else self.memory.look(look)
+        nearest_m: Floats = np.minimum(hidden_m, np.maximum(self._vanished.nearest_m, self._exit_m))
+        return nearest_m
+
+    def _seen_now(self, look: Look) -> Floats:
+        """Return how near a hidden vehicle may be by the visible area alone (M,)."""
+        hidden_m = hidden_distances_kernel(
             self._table,
             len(self.model.lanes),
             np.ascontiguousarray(look.visible_area, dtype=np.float64),
             self.config.sensor_range_m,
         )
-        come_on_m = self._hidden_mps * abs(look.visible_area_age_s)
+        come_on_m = self._hidden_mps * look.visible_area_age_s
         nearest_m: Floats = np.maximum(hidden_m - come_on_m, self._exit_m)
         return nearest_m
 

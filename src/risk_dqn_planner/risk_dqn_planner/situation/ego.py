@@ -44,6 +44,18 @@ def ego_progress(model: IntersectionModel, ego: EgoPose, config: SituationConfig
     return s
 
 
+def between(first: EgoPose, second: EgoPose, share: float) -> EgoPose:
+    """Return the ego a share of the time from one pose to another, 0 to 1: all changes linear."""
+    turn = second.heading_rad - first.heading_rad
+    turn = math.atan2(math.sin(turn), math.cos(turn))
+    return EgoPose(
+        first.x_m + share * (second.x_m - first.x_m),
+        first.y_m + share * (second.y_m - first.y_m),
+        first.heading_rad + share * turn,
+        first.speed_mps + share * (second.speed_mps - first.speed_mps),
+    )
+
+
 def carried_on(ego: EgoPose, time_s: float) -> EgoPose:
     """Return the ego a time later, or earlier if it is below 0: straight on at its speed."""
     way_m = ego.speed_mps * time_s

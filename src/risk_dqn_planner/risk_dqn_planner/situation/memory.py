@@ -22,6 +22,7 @@ from risk_dqn_planner.situation.hidden_space import (
 from risk_dqn_planner.situation.inputs import EgoPose
 from risk_dqn_planner.situation.paths import PathTable
 from risk_dqn_planner.situation.situations import Floats, Situations
+from risk_dqn_planner.situation.vanished import NOBODY, Released
 
 
 @allocating_kernel
@@ -37,6 +38,7 @@ def look_kernel(
     visible_margin_m: float,
     area_age_s: float,
     vehicle_margin_m: float,
+    released: Released,
     situations: Situations,
     space: HiddenSpace,
     work: HiddenWork,
@@ -44,8 +46,8 @@ def look_kernel(
     """Bring all sets to the present; return each lane's nearest place of a hidden vehicle (M,).
 
     exit_m, end_m (P,): see `looked_at`. limit_mps (M,): of hidden vehicles. area_age_s: between
-    what the polygon shows and `time_s`; meanwhile they may have come into it. `sensor_range` where
-    there is no place.
+    what the polygon shows and `time_s`; meanwhile they may have come into it. released: vehicles
+    that were missed before the polygon was taken. `sensor_range` where there is no place.
     """
     mask, ids = situations.vehicle_mask, situations.vehicle_id
     elapsed = elapsed_since(space.time_s[0], time_s)
@@ -66,6 +68,10 @@ def look_kernel(
         work.lost_near_m,
         work.lost_far_m,
     )
+    for k in range(len(released.lane)):
+        work.lost_lane[lost] = released.lane[k]
+        work.lost_near_m[lost], work.lost_far_m[lost] = released.near_m[k], released.far_m[k]
+        lost += 1
     for p in range(len(table.lane)):
         work.hidden[p] = hidden_pieces_kernel(
             table,
@@ -118,7 +124,7 @@ def look_kernel(
 class Look(NamedTuple):
     """What the ego sees at a time on any clock: vehicles (a batch of one), and the area [m].
 
-    visible_area (K, 2), as old as `Perception` says.
+    visible_area (K, 2), as old as `Perception` says. released: whom it can tell of at last.
     """
 
     time_s: float
@@ -126,6 +132,7 @@ class Look(NamedTuple):
     seen: Situations
     visible_area: Floats
     visible_area_age_s: float
+    released: Released = NOBODY
 
 
 class LaneMemory:
@@ -137,7 +144,7 @@ class LaneMemory:
         self._config = config
         self._limit_mps = limit_mps * config.tracking.speed_factor
         self._space = empty_hidden_space(1, len(table.lane), 1)
-        self._work = hidden_work(len(table.lane), 1)
+        self._work = hidden_work(len(table.lane), 1 + len(limit_mps))
         self._bounds = looked_at(table, config.sensor_range_m)
         self._ego: EgoPose | None = None
 
@@ -165,8 +172,9 @@ class LaneMemory:
             self._limit_mps,
             tracking.min_speed_mps,
             tracking.visible_margin_m,
-            abs(look.visible_area_age_s),
+            look.visible_area_age_s,
             tracking.vehicle_margin_m,
+            look.released,
             look.seen,
             self._space,
             self._work,
@@ -201,4 +209,5 @@ class LaneMemory:
             seen_lane=np.pad(space.seen_lane, more),
             seen_distance_m=np.pad(space.seen_distance_m, more),
         )
-        self._work = hidden_work(len(self._table.lane), vehicles)
+        # Those who were missed before are one more for each lane at most.
+        self._work = hidden_work(len(self._table.lane), vehicles + len(self._limit_mps))

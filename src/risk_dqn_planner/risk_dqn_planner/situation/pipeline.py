@@ -52,8 +52,7 @@ class SituationPipeline:
         self.route_fault, self._builder = None, None
         try:
             self._builder = self._builder_of(route)
-            if self._builder.memory is not None:
-                self._builder.memory.forget()
+            self._builder.forget()
         except PlannerError as error:
             self.route_fault = error
 

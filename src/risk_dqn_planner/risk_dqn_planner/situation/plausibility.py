@@ -81,6 +81,15 @@ class Plausibility:
         self._check_area(seen.visible_area)
         self._check_distances(seen)
 
+    def check_next_ego(self, ego: EgoPose, time_s: float) -> None:
+        """Look at an odometry that is newer than the objects; its time is its stamp.
+
+        Raises:
+            InputError: as `check`.
+        """
+        check_ego(ego)
+        self._check_ego(_Ego(time_s, ego))
+
     def _check_ego(self, now: _Ego) -> None:
         limit_mps, speed_mps = self.limits.max_ego_speed_mps, now.pose.speed_mps
         before, self._ego = self._ego, now

@@ -33,10 +33,11 @@ def overdue(sync: Synchroniser, now_ms: int, steady_ms: int = 1000_000) -> Fault
     return sync.overdue(now_ms * MS, steady_ms * MS)
 
 
-def frame(stamp_ms: int, odometry_ms: int, area_ms: int) -> Frame:
+def frame(stamp_ms: int, odometry_ms: int | tuple[int, ...], area_ms: int) -> Frame:
+    around = odometry_ms if isinstance(odometry_ms, tuple) else (odometry_ms,)
     return Frame(
         stamp_ms * MS,
-        f"odometry {odometry_ms}",
+        tuple(f"odometry {each}" for each in around),
         f"visible area {area_ms}",
         f"objects {stamp_ms}",
     )
@@ -82,10 +83,48 @@ def test_of_inputs_that_went_on_those_that_belong_to_the_objects_serve() -> None
     for stamp_ms in range(30, 300, 50):
         give(sync, AREA, stamp_ms)
     give(sync, OBJECTS, 109)
-    # The nearest odometry; an area that is newer than the objects shows too much.
-    assert take(sync) == frame(109, 100, 80)
+    # An area that is newer than the objects shows too much.
+    assert take(sync) == frame(109, (100, 120), 80)
     give(sync, OBJECTS, 131)
-    assert take(sync) == frame(131, 140, 130)
+    assert take(sync) == frame(131, (120, 140), 130)
+    give(sync, OBJECTS, 140)
+    assert take(sync) == frame(140, 140, 130)
+
+
+def test_a_new_errand_does_not_begin_where_the_ego_was_before() -> None:
+    sync = synchroniser()
+    for stamp_ms in (0, 100):
+        give(sync, ODOMETRY, stamp_ms)
+        give(sync, AREA, stamp_ms)
+    sync.begin_errand()
+    give(sync, OBJECTS, 40)
+    assert isinstance(take(sync), Fault)
+    give(sync, OBJECTS, 100)
+    assert take(sync, steady_ms=50) == frame(100, 100, 100)
+
+
+def test_an_odometry_far_ahead_of_the_objects_does_not_serve() -> None:
+    sync = synchroniser()
+    give(sync, AREA, 100)
+    give(sync, ODOMETRY, 601)
+    give(sync, OBJECTS, 100)
+    fault = take(sync)
+    assert isinstance(fault, Fault)
+    assert fault.text == "no odometry within 0.5 s of the objects"
+
+
+def test_late_objects_find_the_area_that_belongs_to_them_also_if_areas_run_ahead() -> None:
+    # Each by nearly as much as it may: 0.42 s behind the clock, and 0.1 s ahead of it.
+    sync = Synchroniser(SynchroniserConfig(), AgeLimits())
+    arrivals = [(t, t, ODOMETRY) for t in range(0, 5000, 10)]
+    arrivals += [(t + 420, t, OBJECTS) for t in range(0, 4600, 100)]
+    arrivals += [(t - 95, t + 5, AREA) for t in range(100, 5000, 100)]
+    due = []
+    for now_ms, stamp_ms, source in sorted(arrivals, key=lambda each: each[0]):
+        give(sync, source, stamp_ms, steady_ms=now_ms, now_ms=now_ms)
+        due.append(take(sync, steady_ms=now_ms, now_ms=now_ms))
+    assert sum(isinstance(each, Frame) for each in due) >= 40
+    assert not [each for each in due[1500:] if isinstance(each, Fault)]
 
 
 def test_an_area_that_is_newer_than_the_objects_does_not_serve_them() -> None:
@@ -121,13 +160,16 @@ def test_what_is_too_old_for_any_objects_is_not_kept() -> None:
     backlog = Backlog()
     for stamp_ns in range(0, 10_000, 10):
         backlog.add(Stamped(stamp_ns, None), max_age_ns=100)
-    # Ten that are not too old, one more in case that all of them are too new, and the newest.
+    # Ten that are not too old, and one more in case that all of them are too new.
     assert len(backlog._messages) == 11
     assert backlog.up_to(9_889) is None
     backlog.forget_later_than(9_935)
-    assert backlog.nearest(10_000) == Stamped(9_930, None)
+    assert backlog.around(10_000) == [Stamped(9_930, None)]
     backlog.forget_later_than(0)
-    assert backlog.nearest(10_000) is None
+    assert backlog.around(10_000) == []
+    for stamp_ns in range(5_000):
+        backlog.add(Stamped(stamp_ns, None), max_age_ns=100_000)
+    assert len(backlog._messages) == 2_000
 
 
 def test_objects_that_keep_coming_do_not_put_the_deadline_off() -> None:
@@ -326,7 +368,7 @@ def test_a_frame_never_holds_an_input_older_than_allowed(
         due = take(sync, steady_ms=(steady + 1) * 100)
         if isinstance(due, Frame):
             assert due.objects == due.stamp_ns // MS
-            for message in (due.odometry, due.visible_area):
+            for message in (due.odometry[-1], due.visible_area):
                 assert isinstance(message, int)
                 assert message >= due.stamp_ns // MS - 500
             assert due.visible_area <= due.objects

@@ -142,9 +142,28 @@ def test_an_ego_of_another_time_than_the_objects_is_taken_to_drive_on(
     area = conversions.area_to_message(square(40.0), 1000 * MS)
     objects = conversions.objects_to_message(object_arrays(), 1000 * MS)
     received = conversions.read_area.of(area), conversions.read_objects.of(objects)
-    report, _ = made.report(Frame(1000 * MS, odometry, *received))
+    report, _ = made.report(Frame(1000 * MS, (odometry,), *received))
     assert report.situations is not None
     assert report.situations.lane_ego_distance_m[0, 0] == pytest.approx(expected_m)
+
+
+def test_an_ego_is_between_the_odometry_before_and_after_the_objects() -> None:
+    made = evaluation("instantaneous", [])
+    poses = (900, -20.0, 4.0), (1050, -19.4, 4.6)
+    odometry = tuple(
+        conversions.ego_to_message(conversions.EgoPose(x, 0.0, 0.0, mps), stamp_ms * MS)
+        for stamp_ms, x, mps in poses
+    )
+    area = conversions.area_to_message(square(40.0), 1000 * MS)
+    objects = conversions.objects_to_message(object_arrays(), 1000 * MS)
+    received = conversions.read_area.of(area), conversions.read_objects.of(objects)
+    report, _ = made.report(Frame(1000 * MS, odometry, *received))
+    assert report.situations is not None
+    assert report.situations.lane_ego_distance_m[0, 0] == pytest.approx(19.6)
+    assert report.situations.ego_speed_mps[0] == pytest.approx(4.4)
+    far = conversions.ego_to_message(conversions.EgoPose(-2.0, 0.0, 0.0, 4.6), 1150 * MS)
+    report, _ = made.report(Frame(1100 * MS, (odometry[1], far), *received))
+    assert (report.status, report.source) == (Status.IMPLAUSIBLE_JUMP, FaultyInput.ODOMETRY)
 
 
 def stamped(message: Message, stamp_ns: int) -> Message:
@@ -167,7 +186,7 @@ def test_whatever_is_perceived_gives_a_sound_situation_or_a_fault_that_is_the_in
         stamp_ns = 1000 * MS + 100 * MS * k
         odometry, area, objects = (stamped(message, stamp_ns) for message in messages)
         received = conversions.read_area.of(area), conversions.read_objects.of(objects)
-        frame = Frame(stamp_ns, odometry, *received)
+        frame = Frame(stamp_ns, (odometry,), *received)
         report, _ = node.report(frame)
         assert not complaints
         if report.status is Status.OK:

@@ -15,7 +15,7 @@ from risk_dqn_planner.situation.inputs import (
     check_objects,
     check_visible_area,
 )
-from risk_dqn_planner.situation.long_vehicles import nearest_ends
+from risk_dqn_planner.situation.long_vehicles import fronts_to_join, nearest_ends
 from risk_dqn_planner.situation.matching import in_footprint_kernel, match_kernel
 from risk_dqn_planner.situation.memory import LaneMemory, Look
 from risk_dqn_planner.situation.occlusion import hidden_distances_kernel
@@ -74,7 +74,7 @@ class SituationBuilder:
         check_visible_area(visible_area)
         ego_s = ego_progress(self.model, ego, self.config)
         lanes = self.model.lanes
-        filled = self._with_vehicles(ego, ego_s, objects)
+        filled, fronts_m = self._with_vehicles(ego, ego_s, objects)
         age_s = abs(visible_area_age_s)
         released = self._vanished.look(time_s, age_s, objects.id, filled)
         look = Look(time_s, ego, filled, visible_area, age_s, released)
@@ -86,17 +86,20 @@ class SituationBuilder:
             lane_id=np.array([[lane.lane_id for lane in lanes]], dtype=np.int64),
             lane_merging=np.array([[lane.kind == ConflictKind.MERGING for lane in lanes]]),
             lane_ego_distance_m=np.array([[lane.ego_zone_center_m - ego_s for lane in lanes]]),
-            lane_hidden_distance_m=self._hidden_distances(look)[None, :],
+            lane_hidden_distance_m=self._hidden_distances(look, fronts_m)[None, :],
             lane_speed_limit_mps=np.array([[lane.speed_limit_mps for lane in lanes]]),
             lane_ego_zone_m=np.array([[lane.ego_zone_length_m for lane in lanes]]),
             lane_zone_m=np.array([[lane.zone_length_m for lane in lanes]]),
         )
 
-    def _hidden_distances(self, look: Look) -> Floats:
-        """Return d_o (M,): how near a hidden vehicle may be, by memory or as the ego sees now."""
+    def _hidden_distances(self, look: Look, fronts_m: Floats) -> Floats:
+        """Return d_o (M,): how near a hidden vehicle may be, by memory or as the ego sees now.
+
+        fronts_m (M,): where fronts of long vehicles count as if one were there.
+        """
         hidden_m = self._seen_now(look) if self.memory is None else self.memory.look(look)
         nearest_m: Floats = np.minimum(hidden_m, np.maximum(self._vanished.nearest_m, self._exit_m))
-        return nearest_m
+        return np.minimum(nearest_m, fronts_m)
 
     def _seen_now(self, look: Look) -> Floats:
         """Return how near a hidden vehicle may be by the visible area alone (M,)."""
@@ -110,7 +113,10 @@ class SituationBuilder:
         nearest_m: Floats = np.maximum(hidden_m - come_on_m, self._exit_m)
         return nearest_m
 
-    def _with_vehicles(self, ego: EgoPose, ego_s: float, objects: ObjectArrays) -> Situations:
+    def _with_vehicles(
+        self, ego: EgoPose, ego_s: float, objects: ObjectArrays
+    ) -> tuple[Situations, Floats]:
+        """Return a situation of vehicles only, and the fronts (M,) of `fronts_to_join`."""
         config = self.config
         who, lane, distance, speed = match_kernel(
             self._table,
@@ -120,9 +126,11 @@ class SituationBuilder:
             self.model.traffic_dimensions.length_m,
             config.position_error_m,
         )
-        distance = nearest_ends(self.model, ego_s, lane, distance, objects.length_m[who])
-        kept = [k for k, i in enumerate(who) if not self._is_ego(ego, objects, i)]
-        order = np.array(sorted(kept, key=lambda k: (objects.id[who[k]], lane[k])), dtype=np.int64)
+        others = np.array([not self._is_ego(ego, objects, i) for i in who], dtype=np.bool_)
+        who, lane, distance, speed = who[others], lane[others], distance[others], speed[others]
+        pairs = (self.model, ego_s, lane, distance, objects.length_m[who])
+        distance, fronts_m = nearest_ends(*pairs), fronts_to_join(*pairs)
+        order = np.lexsort((lane, objects.id[who]))
         # At least one place, so that nobody has to think of arrays without entries.
         situations = empty_situations(1, max(len(order), 1), len(self.model.lanes))
         count = len(order)
@@ -131,7 +139,7 @@ class SituationBuilder:
         situations.vehicle_lane[0, :count] = lane[order]
         situations.vehicle_distance_m[0, :count] = distance[order]
         situations.vehicle_speed_mps[0, :count] = speed[order]
-        return situations
+        return situations, fronts_m
 
     def _is_ego(self, ego: EgoPose, objects: ObjectArrays, index: int) -> bool:
         size = self.model.ego_dimensions

@@ -74,10 +74,10 @@ class SituationBuilder:
         check_visible_area(visible_area)
         ego_s = ego_progress(self.model, ego, self.config)
         lanes = self.model.lanes
-        filled, fronts_m = self._with_vehicles(ego, ego_s, objects)
+        filled, nearest = self._with_vehicles(ego, ego_s, objects)
         age_s = abs(visible_area_age_s)
-        released = self._vanished.look(time_s, age_s, objects.id, filled)
-        look = Look(time_s, ego, filled, visible_area, age_s, released)
+        released = self._vanished.look(time_s, age_s, objects.id, nearest)
+        look = Look(time_s, ego, nearest, visible_area, age_s, released)
         return filled._replace(
             stop_line_distance_m=np.array([self.model.stop_line.position_m - ego_s]),
             goal_distance_m=np.array([self.model.goal_m - ego_s]),
@@ -86,20 +86,23 @@ class SituationBuilder:
             lane_id=np.array([[lane.lane_id for lane in lanes]], dtype=np.int64),
             lane_merging=np.array([[lane.kind == ConflictKind.MERGING for lane in lanes]]),
             lane_ego_distance_m=np.array([[lane.ego_zone_center_m - ego_s for lane in lanes]]),
-            lane_hidden_distance_m=self._hidden_distances(look, fronts_m)[None, :],
+            lane_hidden_distance_m=self._hidden_distances(look, filled)[None, :],
             lane_speed_limit_mps=np.array([[lane.speed_limit_mps for lane in lanes]]),
             lane_ego_zone_m=np.array([[lane.ego_zone_length_m for lane in lanes]]),
             lane_zone_m=np.array([[lane.zone_length_m for lane in lanes]]),
         )
 
-    def _hidden_distances(self, look: Look, fronts_m: Floats) -> Floats:
+    def _hidden_distances(self, look: Look, filled: Situations) -> Floats:
         """Return d_o (M,): how near a hidden vehicle may be, by memory or as the ego sees now.
 
-        fronts_m (M,): where fronts of long vehicles count as if one were there.
+        Where a vehicle looked at is nearer than it counts in `filled`, one counts as hidden.
         """
         hidden_m = self._seen_now(look) if self.memory is None else self.memory.look(look)
         nearest_m: Floats = np.minimum(hidden_m, np.maximum(self._vanished.nearest_m, self._exit_m))
-        return np.minimum(nearest_m, fronts_m)
+        fronts = look.seen.vehicle_distance_m < filled.vehicle_distance_m
+        lane, front_m = look.seen.vehicle_lane[fronts], look.seen.vehicle_distance_m[fronts]
+        np.minimum.at(nearest_m, lane, front_m)
+        return nearest_m
 
     def _seen_now(self, look: Look) -> Floats:
         """Return how near a hidden vehicle may be by the visible area alone (M,)."""
@@ -115,8 +118,11 @@ class SituationBuilder:
 
     def _with_vehicles(
         self, ego: EgoPose, ego_s: float, objects: ObjectArrays
-    ) -> tuple[Situations, Floats]:
-        """Return a situation of vehicles only, and the fronts (M,) of `fronts_to_join`."""
+    ) -> tuple[Situations, Situations]:
+        """Return a situation of vehicles only, and that of `fronts_to_join` where there are such.
+
+        The second is for what is remembered of whoever goes out of sight.
+        """
         config = self.config
         who, lane, distance, speed = match_kernel(
             self._table,
@@ -139,7 +145,9 @@ class SituationBuilder:
         situations.vehicle_lane[0, :count] = lane[order]
         situations.vehicle_distance_m[0, :count] = distance[order]
         situations.vehicle_speed_mps[0, :count] = speed[order]
-        return situations, fronts_m
+        nearest = situations.vehicle_distance_m.copy()
+        nearest[0, :count] = np.minimum(distance, fronts_m)[order]
+        return situations, situations._replace(vehicle_distance_m=nearest)
 
     def _is_ego(self, ego: EgoPose, objects: ObjectArrays, index: int) -> bool:
         size = self.model.ego_dimensions

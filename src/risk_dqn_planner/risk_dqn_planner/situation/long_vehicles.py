@@ -40,21 +40,19 @@ def nearest_ends(
 def fronts_to_join(
     model: IntersectionModel, ego_s: float, lane: Integers, distance_m: Floats, length_m: Floats
 ) -> Floats:
-    """Return per lane (M,) the nearest front that counts as a hidden vehicle; infinity for none.
+    """Return the distances (C,) of fronts that count as hidden vehicles; infinity elsewhere.
 
     Of longer vehicles at merging lanes that count by their rears, but have not left the zone with
-    their fronts. Arguments as of `nearest_ends`; the distance is as of a usual vehicle's centre.
+    their fronts. Arguments as of `nearest_ends`; a front is that of a usual vehicle there.
     """
-    fronts_m = np.full(len(model.lanes), np.inf)
     more_m = longer_by(model, length_m)
     if not more_m.any():
-        return fronts_m
+        return np.full(len(lane), np.inf)
     front_m = distance_m - more_m
     end_m = np.array([-0.5 * each.zone_length_m for each in model.lanes])[lane]
     leads = ahead_of_ego(model, ego_s, lane, front_m) > least_lead(model)
     to_join = (more_m > 0.0) & merges(model)[lane] & leads & (front_m > end_m)
-    np.minimum.at(fronts_m, lane[to_join], front_m[to_join])
-    return fronts_m
+    return np.where(to_join, front_m, np.inf)
 
 
 def longer_by(model: IntersectionModel, length_m: Floats) -> Floats:

@@ -97,6 +97,18 @@ def test_the_front_of_a_lorry_ahead_that_has_not_joined_counts_as_a_hidden_vehic
     assert math.isinf(fronts_to_join(CROSSING, 0.0, *map(np.array, ([0], [6.0], [12.0])))[0])
 
 
+def test_a_lorry_that_was_to_join_and_is_lost_from_sight_is_remembered_by_its_front() -> None:
+    builder, ego = SituationBuilder(MERGING), EgoPose(-40.0, 0.0, 0.0, 4.0)
+    lorry = object_arrays([[0.0, -12.0, math.pi / 2, 0.0]], size_m=(12.0, 2.0))
+    nobody = object_arrays([], size_m=(12.0, 2.0))
+    before = builder.build(ego, lorry, square(60.0), time_s=1.0)
+    assert before.vehicle_distance_m[0, 0] == pytest.approx(16.0)
+    assert before.lane_hidden_distance_m[0, 0] == pytest.approx(8.0)
+    # It is missed after the area was taken, which therefore does not tell that nobody is there.
+    after = builder.build(ego, nobody, square(60.0), visible_area_age_s=0.2, time_s=1.1)
+    assert after.lane_hidden_distance_m[0, 0] < 8.0
+
+
 def admissible(ego: EgoPose, y_m: float, mps: float, length_m: float) -> Booleans:
     row = object_arrays([[0.0, y_m, math.pi / 2, mps]], size_m=(length_m, 2.0))
     situation = SituationBuilder(MERGING).build(ego, row, square(60.0))

@@ -41,7 +41,7 @@ from sim_bridge.evaluation.soundness.evaluate import (
 )
 from sim_bridge.evaluation.store import Store, write_whole
 from sim_bridge.evaluation.training_runs import RUN_FOLDERS, named_runs, training_runs
-from sim_bridge.folders import writing_to
+from sim_bridge.folders import require_writable, writing_to
 from sim_bridge.maps import add_map_file_options, map_names, route_and_origin
 from sim_bridge.threads import compute_on_one_thread
 
@@ -166,6 +166,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         arguments.output = _FOLDERS[arguments.set]
     console = Console()
     try:
+        require_writable(arguments.report)
         if arguments.set == SOUNDNESS:
             _soundness(arguments, console)
         else:

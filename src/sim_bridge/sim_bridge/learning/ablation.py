@@ -23,7 +23,7 @@ from risk_dqn_planner.policies.supervised_loading import is_sound
 from sim_bridge.environment.episodes import DrivenEpisodes, drive
 from sim_bridge.environment.place import Places
 from sim_bridge.environment.seeds import TEST_SEEDS, fixed_seeds
-from sim_bridge.folders import writing_to
+from sim_bridge.folders import require_writable, writing_to
 from sim_bridge.learning.checkpoint import POLICY, SAVE_EVERY_S, RunFolder
 from sim_bridge.learning.export import initial_weights
 from sim_bridge.learning.presets import preset_named
@@ -193,6 +193,7 @@ def _compare(arguments: argparse.Namespace) -> None:
     seeds, out = _seeds(arguments.seeds), arguments.out
     places = [Places.named(name) for name in reference.map_names]
     results: dict[str, list[Figures]] = {}
+    require_writable(arguments.report)
     with writing_to(out):
         for name, change in changes.items():
             for seed in seeds:

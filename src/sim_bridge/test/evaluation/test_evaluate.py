@@ -174,3 +174,20 @@ def test_only_what_was_trained_as_in_the_paper_stands_for_it() -> None:
     assert paper_role("collision_paper") == "collision_aware"
     assert paper_role("risk_tuned") is None
     assert paper_role("always_fast") is None
+
+
+@pytest.mark.parametrize(
+    ("report", "reason"),
+    [("pages", "it is a folder, expected a file"), ("file/page.md", "File exists")],
+)
+def test_a_report_that_cannot_be_written_is_named_before_anything_is_driven(
+    report: str, reason: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "file").write_text("in the way")
+    (tmp_path / "pages").mkdir()
+    options = [*OPTIONS, "--output", str(tmp_path), "--report", str(tmp_path / report)]
+    assert evaluate.main(options) == 2
+    error = capsys.readouterr().err
+    assert error.startswith("error: cannot write to ")
+    assert reason in error
+    assert not (tmp_path / "cells").exists()
